@@ -1,0 +1,47 @@
+"""How far a fitted template and an upload are apart."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from service.mesh.surface import sample_surface
+from service.template.affine import AffineTemplate
+
+Array = NDArray[np.float64]
+
+
+def surface_distance(
+    template: AffineTemplate,
+    parameters: Array,
+    translation: Array,
+    points: Array,
+    normals: Array,
+) -> float:
+    """Symmetric mean distance of the surfaces over the diagonal of the points' bounding box.
+
+    Samples stand for surfaces: a pair of nearest samples is taken to be apart by its gap across
+    the surface, and along it only by what exceeds the spacing of the samples.
+
+    Args:
+        template: the category.
+        parameters, translation: ``[d]``, ``[3]`` of the fit.
+        points, normals: ``[n, 3]`` samples of the upload with their faces' normals.
+    """
+    visible = template.faces[~template.hidden]
+    vertices = template.decode(parameters) + translation
+    samples = sample_surface(vertices, visible, len(points), np.random.default_rng(1))
+    there = _one_way(samples.points, points, normals)
+    back = _one_way(points, samples.points, samples.normals)
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    return 0.5 * (there + back) / diagonal
+
+
+def _one_way(points: Array, surface: Array, normals: Array) -> float:
+    tree = cKDTree(surface)
+    spacing = float(np.median(tree.query(surface, k=5)[0][:, -1]))
+    distance, nearest = tree.query(points)
+    across = np.abs(np.einsum("nc,nc->n", points - surface[nearest], normals[nearest]))
+    along = np.sqrt(np.maximum(distance**2 - across**2, 0.0))
+    return float(np.hypot(across, np.maximum(along - spacing, 0.0)).mean())

@@ -1,0 +1,166 @@
+"""Installed models: a template, an encoder and the card that says what they are."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.encode.session import EncoderSession
+from service.errors import ModelFault
+from service.mesh.surface import Normalization, sample_surface
+from service.template.affine import AffineTemplate
+from service.template.loader import TemplateError, load_template
+
+GOLDEN_TOLERANCE = 1e-3
+SMALLEST = 1e-3
+"""Least length in the normalised frame, where the shape has radius 0.6."""
+
+
+class Model:
+    """A category that the service can infer and edit."""
+
+    def __init__(self, card: Mapping[str, Any], template: AffineTemplate, path: Path, threads: int):
+        self.card = card
+        self.template = template
+        self.name: str = card["name"]
+        self.version: str = card["version"]
+        self.digest: str = card["digest"]
+        self._path = path
+        self._session = EncoderSession(path, threads)
+
+    @property
+    def points(self) -> int:
+        """Size of the clouds that it encodes."""
+        return self._session.points
+
+    def encode(
+        self, points: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Parameters ``[d]`` and translation ``[3]`` of a normalised cloud ``[points, 3]``.
+
+        Lengths are kept above `SMALLEST`, so that no size is negative.
+        """
+        outputs = self._session.run(points)
+        size = len(self.template.parameters)
+        return np.maximum(outputs[:size], SMALLEST), outputs[size:]
+
+    @property
+    def usual_distance(self) -> float:
+        """`surface_distance` that half of the category's real shapes stay below."""
+        return float(self.card["calibration"]["median_distance"])
+
+    def score(self, distance: float) -> float:
+        """How much a fit's distance looks like one of the category, from 1 down to 0.
+
+        1/2 at the distance that 95 % of the category's ordinary shapes stay below.
+        """
+        limit = float(self.card["calibration"]["limit_distance"])
+        return float(1.0 / (1.0 + (distance / limit) ** 4))
+
+    def verify(self) -> None:
+        """Check the file's digest, and a golden request against its recorded answer.
+
+        Raises:
+            ModelFault: when either differs.
+        """
+        digest = file_digest(self._path)
+        if digest != self.digest:
+            raise ModelFault(
+                "model_digest",
+                f"{self._path.name} is {digest}, its card says {self.digest}",
+                "Install the model file and its card from the same export.",
+            )
+        answer = self._session.run(golden_cloud(self.template, self.points))
+        gap = float(np.abs(answer - np.array(self.card["golden"])).max())
+        if not gap < GOLDEN_TOLERANCE:
+            raise ModelFault(
+                "model_golden",
+                f"{self.name} answers its golden request off by {gap:.2g}",
+                "Export the model again, or check the installed onnxruntime.",
+            )
+
+    def describe(self) -> dict[str, Any]:
+        """What `GET /categories/{name}` says."""
+        template = self.template
+        return {
+            "name": self.name,
+            "label": template.label,
+            "points": self.points,
+            "model": {"name": self.name, "version": self.version, "digest": self.digest},
+            "keep": list(template.anchors),
+            "parameters": [
+                *(
+                    _entry(p.name, p.label, p.group, (p.low, p.high), p.typical, False, p.paper)
+                    for p in template.parameters
+                ),
+                *(
+                    _entry(d.name, d.label, d.group, d.typical, d.typical, True, None)
+                    for d in template.derived.values()
+                ),
+            ],
+        }
+
+
+def _entry(
+    name: str,
+    label: str,
+    group: str,
+    ends: tuple[float, float],
+    typical: tuple[float, float],
+    derived: bool,
+    paper: str | None,
+) -> dict[str, Any]:
+    return {
+        "name": name,
+        "label": label,
+        "group": group,
+        "unit": "m",
+        "kind": "length",
+        "range": list(ends),
+        "typical": list(typical),
+        "step": 0.001 if typical[1] < 0.3 else 0.005,
+        "derived": derived,
+        "paper_name": paper,
+    }
+
+
+def golden_cloud(template: AffineTemplate, points: int) -> NDArray[np.float32]:
+    """A fixed cloud: the template in the middle of its ranges, sampled with a fixed seed."""
+    vertices = template.decode((template.low + template.high) / 2)
+    cloud = sample_surface(vertices, template.faces, points, np.random.default_rng(0)).points
+    return Normalization.of(cloud).apply(cloud).astype(np.float32)
+
+
+def file_digest(path: Path) -> str:
+    """``sha256-<hex>`` of a file."""
+    return f"sha256-{hashlib.sha256(path.read_bytes()).hexdigest()}"
+
+
+def load_models(directory: Path, threads: int = 1) -> dict[str, Model]:
+    """Every model of a folder: ``<name>.json`` cards with ``<name>.onnx`` beside them.
+
+    A ``<name>.yaml`` there is the category's template; without one it is a built-in's.
+
+    Raises:
+        ModelFault: for a card, network or template that can't be read.
+    """
+    models: dict[str, Model] = {}
+    for path in sorted(directory.glob("*.json")):
+        own = path.with_suffix(".yaml")
+        try:
+            card = json.loads(path.read_text("utf-8"))
+            template = load_template(own if own.is_file() else str(card["name"]))
+            models[card["name"]] = Model(card, template, path.with_suffix(".onnx"), threads)
+        except (OSError, ValueError, KeyError, TemplateError) as error:
+            raise ModelFault(
+                "model_unreadable",
+                f"{path.name} can't be loaded: {error}",
+                "Export the model again, or remove it from the models folder.",
+            ) from error
+    return models

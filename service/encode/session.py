@@ -1,0 +1,58 @@
+"""onnxruntime sessions with every option set on purpose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from service.errors import ModelFault
+
+
+class EncoderSession:
+    """A loaded encoder: one cloud of a fixed size in, ``d + 3`` numbers out."""
+
+    def __init__(self, path: Path, threads: int = 1) -> None:
+        """
+        Args:
+            path: the ONNX file.
+            threads: that one encoding may use.
+
+        Raises:
+            ModelFault: when the file is no such network.
+        """
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = threads
+        options.inter_op_num_threads = 1
+        options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+        # Spinning wins microseconds and costs whole cores that other requests need.
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        # The arena keeps its high-water mark for ever; with one fixed shape it gains nothing.
+        options.enable_cpu_mem_arena = False
+        options.log_severity_level = 3
+        try:
+            self._session = onnxruntime.InferenceSession(
+                path.read_bytes(), options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:
+            raise ModelFault(
+                "model_unreadable",
+                f"{path.name} can't be loaded: {type(error).__name__}",
+                "Export the model again.",
+            ) from error
+        shape = self._session.get_inputs()[0].shape
+        if len(shape) != 3 or shape[0] != 1 or shape[2] != 3 or not isinstance(shape[1], int):
+            raise ModelFault(
+                "model_shape",
+                f"{path.name} takes {shape}, not [1, points, 3]",
+                "Export the model again.",
+            )
+        self.points: int = shape[1]
+
+    def run(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """``[points, 3]`` normalised cloud to ``[d + 3]`` outputs."""
+        cloud = np.ascontiguousarray(points, dtype=np.float32)[None]
+        (outputs,) = self._session.run(None, {"points": cloud})
+        return np.asarray(outputs[0], dtype=np.float64)

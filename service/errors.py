@@ -1,0 +1,49 @@
+"""What can go wrong with a request, free of HTTP.
+
+    ShapeError
+    |- UnsupportedFormat    not a format we read, or a feature we can't carry through
+    |- InvalidMesh          the file is broken or holds no usable surface
+    |- TooLarge             over a limit on bytes, vertices or faces
+    |- InvalidRequest       an option, parameter name or edit value that makes no sense
+    |- NotFound             no such category or stored mesh
+    `- ModelFault           an installed model that can't be trusted
+
+Each error carries a stable `code` (snake_case, part of the API), a `detail` that names what was
+found, and a `suggestion` that says what to do.  `service.api.problems` maps classes to statuses.
+"""
+
+from __future__ import annotations
+
+
+class ShapeError(Exception):
+    """Base of every error that a client can be told about."""
+
+    def __init__(self, code: str, detail: str, suggestion: str) -> None:
+        super().__init__(f"{code}: {detail}")
+        self.code = code
+        self.detail = detail
+        self.suggestion = suggestion
+
+
+class UnsupportedFormat(ShapeError):
+    """The format, or a feature of it, can't be carried through without loss."""
+
+
+class InvalidMesh(ShapeError):
+    """The file is broken, or holds no usable surface."""
+
+
+class TooLarge(ShapeError):
+    """The upload is over a limit."""
+
+
+class InvalidRequest(ShapeError):
+    """An option, a name or a value of the request makes no sense."""
+
+
+class NotFound(ShapeError):
+    """There is no such thing here."""
+
+
+class ModelFault(ShapeError):
+    """An installed model is missing a part, altered, or answers wrongly."""

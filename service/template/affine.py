@@ -1,0 +1,100 @@
+"""Templates whose every coordinate is affine in the parameters: decoding is one product.
+
+The analytic decoder of the paper (section 3): parameters in, a mesh of fixed vertices and faces
+out.  `base` and `jacobian` are plain arrays, so numpy and torch decode from the same definition.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.template.parameters import Derived, Parameter
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AffineTemplate:
+    """A rigid category's template; lengths are linear in the parameters and in any unit.
+
+    Attributes:
+        name, label: of the category.
+        points: size of the point clouds that its encoder takes.
+        parameters: the ``d`` parameters, in order.
+        derived: further dimensions by name.
+        relations: ``[r, 1 + d]`` affine rows that are non-negative on sensible shapes.
+        base: ``[V, 3]`` vertices at all-zero parameters.
+        jacobian: ``[V, 3, d]``; vertices are ``base + jacobian @ f``.
+        faces: ``[F, 3]`` int64, counter-clockwise from outside.
+        part: ``[V]`` int64, which of `parts` a vertex belongs to.
+        parts: names of the ``P`` parts.
+        hidden: ``[F]`` bool, faces inside the shape, never seen from outside.
+        frame_base, frame_jacobian: ``[P, 3, 4]`` and ``[P, 3, 4, d]``; a part is the image of a
+            fixed unit shape under its frame, ``frame @ [u, 1]``.
+        anchors: ``[1 + d]`` rows a coordinate, by name: points an edit can hold in place.
+    """
+
+    name: str
+    label: str
+    points: int
+    parameters: tuple[Parameter, ...]
+    derived: dict[str, Derived]
+    relations: Array
+    base: Array
+    jacobian: Array
+    faces: NDArray[np.int64]
+    part: NDArray[np.int64]
+    parts: tuple[str, ...]
+    hidden: NDArray[np.bool_]
+    frame_base: Array
+    frame_jacobian: Array
+    anchors: dict[str, Array]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameter names, in order."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def low(self) -> Array:
+        """``[d]`` lower ends of the ranges."""
+        return np.array([parameter.low for parameter in self.parameters])
+
+    @property
+    def high(self) -> Array:
+        """``[d]`` upper ends of the ranges."""
+        return np.array([parameter.high for parameter in self.parameters])
+
+    def decode(self, f: Array) -> Array:
+        """Vertices for parameters: ``f [..., d]`` to ``[..., V, 3]``."""
+        return self.base + np.einsum("vcd,...d->...vc", self.jacobian, f)
+
+    def frames(self, f: Array) -> Array:
+        """``[P, 3, 4]`` map from each part's unit shape to space, for ``f [d]``."""
+        return self.frame_base + self.frame_jacobian @ f
+
+    def anchor(self, name: str) -> tuple[Array, Array]:
+        """Constant ``[3]`` and Jacobian ``[3, d]`` of the point that an edit can hold in place."""
+        rows = self.anchors[name]
+        return rows[:, 0], rows[:, 1:]
+
+    def face_areas(self, vertices: Array) -> Array:
+        """``[F]`` areas of the faces for ``vertices [V, 3]``."""
+        areas: Array = 0.5 * np.linalg.norm(self._crosses(vertices), axis=-1)
+        return areas
+
+    def normals(self, vertices: Array) -> Array:
+        """``[V, 3]`` unit vertex normals: area-weighted means over the faces that meet there."""
+        crosses = self._crosses(vertices)
+        normals = np.zeros_like(vertices)
+        for corner in range(3):
+            np.add.at(normals, self.faces[:, corner], crosses)
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        return normals / np.maximum(length, np.finfo(float).tiny)
+
+    def _crosses(self, vertices: Array) -> Array:
+        a, b, c = (vertices[self.faces[:, corner]] for corner in range(3))
+        return np.cross(b - a, c - a)

@@ -1,0 +1,52 @@
+"""What a template's parameters and derived dimensions are called, and where they may lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Axis = Literal["x", "y", "z"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A semantic parameter: a length in metres, wherever a template speaks of it.
+
+    Attributes:
+        name: its name in the API.
+        label: its name for people.
+        group: the part of the shape it belongs to, to sort sliders by.
+        paper: what the paper calls it.
+        low, high: the range that synthetic shapes are drawn from.
+        typical: where most real shapes lie; what a slider spans.
+    """
+
+    name: str
+    label: str
+    group: str
+    paper: str
+    low: float
+    high: float
+    typical: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A dimension that follows from the parameters, readable and settable.
+
+    Attributes:
+        row: ``[1 + d]`` affine row that gives it, or None when it is an extent.
+        extent: the axis along which it is measured on the mesh itself, or None.
+        by: indices of the parameters that setting it changes, in proportion to their values.
+    """
+
+    name: str
+    label: str
+    group: str
+    typical: tuple[float, float]
+    row: NDArray[np.float64] | None
+    extent: Axis | None
+    by: tuple[int, ...]
