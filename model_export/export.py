@@ -1,0 +1,164 @@
+"""Export a trained encoder to ONNX with its model card: ``python -m model_export.export chair``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import warnings
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from model_export.evaluate import clouds_of, real_fits, synthetic_table
+from model_export.networks import PointEncoder, fold_batch_norm
+from model_export.realistic import RealisticShape, find_shapes
+from service.encode.model import Model, file_digest, golden_cloud
+from service.encode.session import EncoderSession
+from service.template.affine import AffineTemplate
+from service.template.loader import load_template
+
+TOLERANCE = 1e-4
+PAPER = "Wei et al., Learning to Infer Semantic Parameters for 3D Shape Editing, 3DV 2020"
+SHIPPED = Path(__file__).parent.parent / "service" / "models"
+
+
+def load_encoder(state: dict[str, Any]) -> PointEncoder:
+    """The encoder of a checkpoint, in evaluation mode."""
+    weights, config = state["encoder"], state["config"]
+    encoder = PointEncoder(weights["mean"], weights["spread"], config["shared"], config["head"])
+    encoder.load_state_dict(weights)
+    return encoder.eval()
+
+
+def write_onnx(encoder: PointEncoder, points: int, path: Path) -> None:
+    """Write the encoder for one cloud of a fixed size: input ``points``, output ``outputs``."""
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torch.onnx.export(
+            fold_batch_norm(encoder),
+            (torch.zeros(1, points, 3),),
+            str(path),
+            input_names=["points"],
+            output_names=["outputs"],
+            dynamo=True,
+            external_data=False,
+            verbose=False,
+        )
+
+
+def check_onnx(encoder: PointEncoder, path: Path, clouds: list[np.ndarray]) -> float:
+    """Largest difference between torch and onnxruntime over the clouds.
+
+    Raises:
+        ValueError: when it is not below 1e-4.
+    """
+    session = EncoderSession(path)
+    gap = 0.0
+    for cloud in clouds:
+        with torch.no_grad():
+            expected = encoder(torch.as_tensor(cloud, dtype=torch.float32)[None])[0].numpy()
+        gap = max(gap, float(np.abs(session.run(cloud) - expected).max()))
+    if not gap < TOLERANCE:
+        raise ValueError(f"the exported network differs from the trained one by {gap:.2g}")
+    return gap
+
+
+def random_clouds(points: int, count: int, seed: int = 0) -> list[np.ndarray]:
+    """Clouds of no shape at all, inside the sphere."""
+    rng = np.random.default_rng(seed)
+    return [rng.uniform(-0.35, 0.35, (points, 3)).astype(np.float32) for _ in range(count)]
+
+
+def build_card(
+    template: AffineTemplate, state: dict[str, Any], path: Path, version: str
+) -> dict[str, Any]:
+    """What the card says before anything is measured."""
+    golden = EncoderSession(path).run(golden_cloud(template, template.points))
+    return {
+        "name": template.name,
+        "label": template.label,
+        "version": version,
+        "digest": file_digest(path),
+        "source": PAPER,
+        "licence": "Apache-2.0",
+        "input": {
+            "points": template.points,
+            "frame": "+Y up, +Z front; zero mean, farthest point at radius 0.6",
+        },
+        "parameters": [
+            {
+                "name": p.name, "label": p.label, "paper_name": p.paper, "unit": "m",
+                "range": [p.low, p.high], "typical": list(p.typical),
+            }
+            for p in template.parameters
+        ],
+        "training": {
+            "steps": state["step"],
+            "hours": round(state["seconds"] / 3600, 2),
+            "place": state["place"],
+            "config": state["config"],
+        },
+        "golden": [round(float(value), 6) for value in golden],
+    }  # fmt: skip
+
+
+def describe_data(shapes: list[RealisticShape]) -> dict[str, Any]:
+    """What real shapes were used and under which licences."""
+    licences = Counter(str(shape.info.get("licence", "unknown")) for shape in shapes)
+    held_out = sum(shape.held_out for shape in shapes)
+    return {
+        "synthetic": "drawn from the ranges on the fly, labelled by construction",
+        "realistic": {
+            "train": len(shapes) - held_out,
+            "test": held_out,
+            "labels": "none",
+            "licences": dict(licences.most_common()),
+        },
+    }
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m model_export.export", description=__doc__)
+    parser.add_argument("name", help="name of the run and of the category")
+    parser.add_argument("--run", type=Path, help="its folder (default runs/<name>)")
+    parser.add_argument("--realistic", type=Path, help="real meshes, to check and to measure on")
+    parser.add_argument("--ablation", type=Path, help="JSON of further runs' figures to record")
+    parser.add_argument("--cache", type=Path, default=Path("cache"), help="for sampled clouds")
+    parser.add_argument("--out", type=Path, default=SHIPPED, help="models folder")
+    parser.add_argument("--version", default="1.0.0", help="of the model")
+    parser.add_argument("--count", type=int, default=1000, help="synthetic shapes to measure on")
+    arguments = parser.parse_args()
+    folder = arguments.run or Path("runs") / arguments.name
+    state = torch.load(folder / "checkpoint.pt", map_location="cpu")
+    template = load_template(state["config"]["template"])
+    encoder = load_encoder(state)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    path = arguments.out / f"{template.name}.onnx"
+    write_onnx(encoder, template.points, path)
+    shapes = find_shapes(arguments.realistic) if arguments.realistic else []
+    clouds = clouds_of(shapes[:20], arguments.cache, template.points)
+    gap = check_onnx(encoder, path, random_clouds(template.points, 20) + clouds)
+    print(f"onnxruntime and torch differ by {gap:.1e} over {20 + len(clouds)} clouds")
+    card = build_card(template, state, path, arguments.version)
+    card["data"] = describe_data(shapes)
+    model = Model(card, template, path, threads=1)
+    card["metrics"] = {"synthetic": synthetic_table(model, arguments.count)}
+    if shapes:
+        held_out = [shape for shape in shapes if shape.held_out]
+        card["metrics"]["realistic"] = real_fits(model, held_out)
+    if arguments.ablation:
+        card["metrics"]["ablation"] = json.loads(arguments.ablation.read_text("utf-8"))
+    card_path = path.with_suffix(".json")
+    card_path.write_text(json.dumps(card, indent=2) + "\n", "utf-8")
+    model.verify()
+    print(f"wrote {path} and {card_path}")
+
+
+if __name__ == "__main__":
+    main()
