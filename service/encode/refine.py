@@ -35,13 +35,13 @@ class Settings:
         pull: weight of the encoder's answer.
     """
 
-    iterations: int = 24
+    iterations: int = 20
     template_points: int = 1600
-    coarse: float = 0.10
-    fine: float = 0.025
+    coarse: float = 0.30
+    fine: float = 0.04
     normal_weight: float = 0.10
     slide: float = 0.10
-    pull: float = 2e-5
+    pull: float = 5e-6
 
 
 @dataclass(frozen=True)
@@ -159,14 +159,19 @@ class _Matcher:
         self.points = cloud.points
         self.weight = normal_weight
         self.features = np.hstack([cloud.points, normal_weight * cloud.normals])
-        self.tree = cKDTree(self.features)
+        self.tree = _tree(self.features)
 
     def pairs(self, points: Array, normals: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """For each template sample its cloud point; for each cloud point its template sample."""
         features = np.hstack([points, self.weight * normals])
         there = self.tree.query(features)[1]
-        back = cKDTree(features).query(self.features)[1]
+        back = _tree(features).query(self.features)[1]
         return there, back
+
+
+def _tree(features: Array) -> cKDTree:
+    """Midpoint splits: flat sides make median ones slow, with most coordinates equal."""
+    return cKDTree(features, balanced_tree=False, compact_nodes=False)
 
 
 def _normal_equations(
@@ -188,7 +193,8 @@ def _normal_equations(
     jacobian = moving.jacobian
     across = np.einsum("mc,mcd->md", normals, jacobian)
     hessian = (1 - slide) * (across * total[:, None]).T @ across
-    hessian += slide * np.einsum("mcd,m,mce->de", jacobian, total, jacobian, optimize=True)
+    flat = jacobian.reshape(-1, jacobian.shape[2])
+    hessian += slide * (flat * np.repeat(total, 3)[:, None]).T @ flat
     normal_gap = np.einsum("mc,mc->m", normals, mean_gap)
     gradient = (1 - slide) * across.T @ normal_gap
     gradient += slide * np.einsum("mcd,mc->d", jacobian, mean_gap)

@@ -1,0 +1,107 @@
+"""POST /edit: the same file with its parameters changed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Form, Request
+from starlette.responses import JSONResponse, Response
+
+from service import pipeline
+from service.api.accept import negotiate
+from service.api.context import Shared
+from service.api.filenames import edited_name
+from service.api.forms import EditForm, form_content_type, upload_of
+from service.api.mesh_response import mesh_response
+from service.api.problems import documented
+from service.api.schemas import MESH_CONTENT, MESH_HEADERS, EditReport
+from service.api.store import MeshStore
+from service.edits import parse_edits
+from service.encode.model import Model
+from service.pipeline import Edited, Upload
+
+JSON = "application/json"
+
+router = APIRouter(tags=["shapes"])
+
+
+@router.post(
+    "/edit",
+    summary="Change a mesh's parameters",
+    description="Answers the uploaded file with its vertices moved: the same vertices in the same "
+    "order, faces, texture coordinates, materials, nodes and names. An empty edit answers the "
+    "file's own bytes.\n\n"
+    '    curl -F mesh=@chair.glb -F \'edits={"seat_width": {"scale": 1.2}}\' \\\n'
+    "         http://127.0.0.1:8000/edit -OJ\n\n"
+    "With `Accept: application/json` it answers a report instead, and keeps the edited mesh for "
+    "`GET /meshes/{mesh_id}`.",
+    dependencies=[Depends(form_content_type)],
+    response_class=Response,
+    responses={
+        200: {
+            "description": "The edited file, or the report of the edit.",
+            "model": EditReport,
+            "content": MESH_CONTENT,
+            "headers": {
+                **MESH_HEADERS,
+                "Shape-Parameters": {
+                    "description": "JSON: the parameters' values after the edit.",
+                    "schema": {"type": "string", "contentMediaType": JSON},
+                },
+            },
+        },
+        304: {"description": "The client's `If-None-Match` names the edited file."},
+        **documented(400, 404, 413, 415, 422, 500, 503),
+    },
+)
+async def edit(
+    request: Request,
+    form: Annotated[EditForm, Form(media_type="multipart/form-data")],
+    shared: Shared,
+) -> Response:
+    upload = await upload_of(request, form, shared.store)
+    models = await shared.readiness.models()
+    return await shared.workers.run(_edit, request, form, upload, models, shared.store)
+
+
+def _edit(
+    request: Request,
+    form: EditForm,
+    upload: Upload,
+    models: Mapping[str, Model],
+    store: MeshStore,
+) -> Response:
+    edits = parse_edits(form.edits)
+    edited = pipeline.edit(upload, models, form.infer_options(), edits, form.edit_options())
+    result = Upload(edited.data, edited_name(upload.name, edited.format), edited.media_type)
+    accept = ",".join(request.headers.getlist("accept"))
+    if negotiate(accept, [edited.media_type, JSON]) == JSON:
+        return JSONResponse(_report(store, upload, result, edited), headers={"Vary": "Accept"})
+    headers = {
+        "Cache-Control": "private, no-cache",
+        "Shape-Parameters": _compact(edited.parameters),
+        "Vary": "Accept",
+    }
+    return mesh_response(request, result, result.mesh_id, headers)
+
+
+def _report(store: MeshStore, upload: Upload, result: Upload, edited: Edited) -> dict[str, Any]:
+    """The report of an edit, and both of its meshes put into the store."""
+    warnings = list(edited.report["warnings"])
+    store.put(upload)
+    if not store.put(result):
+        warnings.append("The edited mesh is too large to be kept: its mesh_id can't be used.")
+    return {
+        "mesh_id": result.mesh_id,
+        "source_mesh_id": upload.mesh_id,
+        **edited.report,
+        "warnings": warnings,
+    }
+
+
+def _compact(parameters: Mapping[str, float]) -> str:
+    """JSON for a header: six significant digits, no spaces."""
+    rounded = {name: float(f"{value:.6g}") for name, value in parameters.items()}
+    return json.dumps(rounded, separators=(",", ":"))

@@ -1,0 +1,153 @@
+"""The multipart forms: a mesh, or the id of one that is kept, and the options beside it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Annotated, Any, Literal
+
+from fastapi import File, Request, UploadFile
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic.json_schema import SkipJsonSchema
+from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
+from starlette.formparsers import MultiPartParser
+
+from service.api.store import MeshStore
+from service.errors import InvalidRequest, UnsupportedFormat
+from service.pipeline import EditOptions, InferOptions, Upload
+
+# Uploads are bounded and are read into memory anyway: keep them off the disk, so that a container
+# with a read-only root needs no temporary folder.
+MultiPartParser.spool_max_size = 1 << 62
+
+FORM_TYPES = ("multipart/form-data", "application/x-www-form-urlencoded")
+
+Direction = Literal["auto", "+x", "-x", "+y", "-y", "+z", "-z"]
+Text = str | SkipJsonSchema[None]
+
+
+class InferForm(BaseModel):
+    """A mesh and how to read it."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    mesh: Annotated[
+        UploadFile | SkipJsonSchema[None],
+        File(
+            description="The mesh file; its format comes from the name's suffix, else from the "
+            "part's content type, else from its first bytes. Either this or `mesh_id`."
+        ),
+    ] = None
+    mesh_id: Annotated[
+        Text, Field(description="The id of a mesh that an earlier answer named, in its stead.")
+    ] = None
+    category: Annotated[
+        str, Field(description="A name that `GET /categories` lists, or `auto`.")
+    ] = "auto"
+    up: Annotated[Direction, Field(description="The upload's axis that points up.")] = "auto"
+    front: Annotated[
+        Direction, Field(description="The upload's axis that points to the front.")
+    ] = "auto"
+    units: Annotated[
+        Literal["m", "cm", "mm", "in", "ft"],
+        Field(description="The file's unit of length, and the answer's; glTF is always metres."),
+    ] = "m"
+    refine: Annotated[
+        bool, Field(description="Whether to improve the inferred values by a fit to the mesh.")
+    ] = True
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_fields(cls, fields: Any) -> Any:
+        """Unknown fields are told with the known ones, which pydantic's own error leaves out."""
+        unknown = [name for name in fields if name not in cls.model_fields]
+        if unknown:
+            kind = PydanticCustomError(
+                "extra_forbidden", "there is no such field", {"known": list(cls.model_fields)}
+            )
+            lines = [InitErrorDetails(type=kind, loc=(name,), input=None) for name in unknown]
+            raise ValidationError.from_exception_data(cls.__name__, lines)
+        return fields
+
+    def infer_options(self) -> InferOptions:
+        """The options as the pipeline takes them."""
+        return InferOptions(
+            category=self.category,
+            up=self.up,
+            front=self.front,
+            units=self.units,
+            refine=self.refine,
+        )
+
+
+class EditForm(InferForm):
+    """A mesh, how to read it, and what to change."""
+
+    edits: Annotated[
+        str,
+        Field(
+            description='A JSON object: a parameter or derived dimension to `{"set": value}`, '
+            '`{"add": value}`, `{"scale": factor}` or a bare number, which sets it.',
+            examples=['{"seat_width": {"scale": 1.2}, "seat_top_height": 0.45}'],
+            json_schema_extra={"contentMediaType": "application/json"},
+        ),
+    ]
+    mode: Annotated[
+        Literal["blend", "paper"],
+        Field(description="How the mesh follows its template: blended transforms of the parts, or "
+            "the paper's weighted displacements."),
+    ] = "blend"  # fmt: skip
+    keep: Annotated[
+        Text,
+        Field(description="The point that stays in place; `GET /categories/{name}` lists them."),
+    ] = None
+    format: Annotated[
+        Literal["glb", "gltf", "obj", "ply", "stl", "off"] | SkipJsonSchema[None],
+        Field(description="The answer's format; by default the upload's own."),
+    ] = None
+
+    def edit_options(self) -> EditOptions:
+        """The options as the pipeline takes them."""
+        return EditOptions(mode=self.mode, keep=self.keep, format=self.format)
+
+
+def form_content_type(request: Request) -> None:
+    """Refuse a body that is no form; the framework would read it as an empty one."""
+    content_type = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    if content_type and content_type not in FORM_TYPES:
+        raise UnsupportedFormat(
+            "body_not_a_form",
+            f"The body is {content_type[:80]!r}.",
+            "Send multipart/form-data with the file as the part `mesh`: curl -F mesh=@chair.glb.",
+        )
+
+
+async def upload_of(request: Request, form: InferForm, store: MeshStore) -> Upload:
+    """The mesh that a form sends or names.
+
+    Raises:
+        InvalidRequest: when it is missing, twofold, or any field is repeated.
+        NotFound: when no mesh is kept under the id.
+    """
+    names = Counter(name for name, _ in (await request.form()).multi_items())
+    repeated = [name for name, count in names.items() if count > 1]
+    if form.mesh is not None and (form.mesh_id is not None or "mesh" in repeated):
+        raise InvalidRequest(
+            "mesh_ambiguous",
+            "The form holds more than one mesh.",
+            "Send one: either one part `mesh` or one field `mesh_id`.",
+        )
+    if repeated:
+        raise InvalidRequest(
+            "field_repeated",
+            f"The form field {repeated[0]!r} comes {names[repeated[0]]} times.",
+            "Send each field once.",
+        )
+    if form.mesh is not None:
+        return Upload(await form.mesh.read(), form.mesh.filename, form.mesh.content_type)
+    if form.mesh_id is not None:
+        return store.get(form.mesh_id)
+    raise InvalidRequest(
+        "mesh_missing",
+        "The form holds no mesh.",
+        "Send the file as the part `mesh` (curl -F mesh=@chair.glb), or a `mesh_id`.",
+    )

@@ -1,0 +1,38 @@
+"""GET /meshes/{mesh_id}: a mesh that is kept."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Request
+from starlette.responses import Response
+
+from service.api.context import Shared
+from service.api.mesh_response import mesh_response
+from service.api.problems import documented
+from service.api.schemas import MESH_CONTENT, MESH_HEADERS
+
+router = APIRouter(tags=["meshes"])
+
+# An id is its content's digest, so what it names never changes; the meshes are the client's own.
+CACHING = {"Cache-Control": "private, max-age=31536000, immutable"}
+
+
+@router.get(
+    "/meshes/{mesh_id}",
+    summary="Fetch a kept mesh",
+    description="The file that an earlier answer named by `mesh_id`, byte for byte. The cache is "
+    "bounded: a mesh that is gone is a 404 with the code `mesh_id_unknown`.",
+    response_class=Response,
+    responses={
+        200: {"description": "The file.", "content": MESH_CONTENT, "headers": MESH_HEADERS},
+        304: {"description": "The client's `If-None-Match` names this mesh."},
+        **documented(404, 500),
+    },
+)
+async def get_mesh(
+    request: Request,
+    mesh_id: Annotated[str, Path(examples=["sha256-0f4b..."])],
+    shared: Shared,
+) -> Response:
+    return mesh_response(request, shared.store.get(mesh_id), mesh_id, CACHING)

@@ -1,0 +1,86 @@
+"""The OpenAPI document: FastAPI's, with the problem schema; `python -m` this prints it as YAML."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+
+from service.api.schemas import ProblemDocument
+
+DESCRIPTION = """\
+Upload your own mesh; get its named parameters in real units; edit them; get back *the same file*
+with only its vertices moved.
+
+    curl -F mesh=@chair.glb http://127.0.0.1:8000/infer
+    curl -F mesh=@chair.glb -F 'edits={"seat_width": {"scale": 1.2}}' \\
+         http://127.0.0.1:8000/edit -OJ
+
+Formats: `.glb`, `.gltf` (self-contained), `.obj`, `.ply`, `.stl`, `.off`. Every error is an
+`application/problem+json` with a stable `code`, a `detail` and a `suggestion`. Every answer has a
+`Trace-Id`.
+"""
+
+TAGS = [
+    {"name": "shapes", "description": "Infer and edit."},
+    {"name": "meshes", "description": "Meshes that are kept for a while, by content."},
+    {"name": "categories", "description": "What can be uploaded."},
+    {"name": "probes", "description": "For orchestrators."},
+]
+
+
+def document(app: FastAPI) -> dict[str, Any]:
+    """The app's OpenAPI document, made once."""
+    if app.openapi_schema is None:
+        spec = get_openapi(
+            title=app.title,
+            version=app.version,
+            summary=app.summary,
+            description=DESCRIPTION,
+            tags=TAGS,
+            routes=app.routes,
+        )
+        schemas = spec["components"]["schemas"]
+        schemas["ProblemDocument"] = ProblemDocument.model_json_schema()
+        _drop_the_frameworks_errors(spec)
+        app.openapi_schema = spec
+    return app.openapi_schema
+
+
+def _drop_the_frameworks_errors(spec: dict[str, Any]) -> None:
+    """Errors that FastAPI lists of itself, in a shape that this service never sends."""
+    for operations in spec["paths"].values():
+        for operation in operations.values():
+            if "application/json" in operation["responses"].get("422", {}).get("content", {}):
+                del operation["responses"]["422"]
+    for name in ("HTTPValidationError", "ValidationError"):
+        spec["components"]["schemas"].pop(name, None)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes texts of several lines as blocks, and repeats what is shared."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = "|" if "\n" in text else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _text)
+
+
+def as_yaml(spec: dict[str, Any]) -> str:
+    """The document as YAML, the same text every time."""
+    text: str = yaml.dump(spec, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+    return text
+
+
+if __name__ == "__main__":
+    from service.main import create_app
+
+    print(as_yaml(create_app().openapi()), end="")

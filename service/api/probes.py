@@ -1,0 +1,48 @@
+"""GET /livez and /readyz: what an orchestrator asks; GET /: the way in."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+from starlette.responses import JSONResponse, RedirectResponse
+
+from service.api.context import Shared
+from service.api.problems import documented
+from service.api.schemas import Alive, Ready
+
+router = APIRouter(tags=["probes"])
+
+
+@router.get(
+    "/livez",
+    summary="Is the process alive?",
+    description="Always 200, at once, however busy the workers are.",
+    response_class=JSONResponse,
+    responses={200: {"model": Alive, "description": "It is."}},
+)
+async def livez() -> JSONResponse:
+    return JSONResponse({"status": "alive"})
+
+
+@router.get(
+    "/readyz",
+    summary="Can it take requests?",
+    description="503 until every model is loaded and has answered its golden request: with the "
+    "code `starting`, or `model_fault` when that will not happen by itself.",
+    response_class=JSONResponse,
+    responses={
+        200: {"model": Ready, "description": "It can, with these models."},
+        **documented(503),
+    },
+)
+async def readyz(shared: Shared) -> JSONResponse:
+    models = shared.readiness.loaded()
+    names = {
+        name: {"name": model.name, "version": model.version, "digest": model.digest}
+        for name, model in models.items()
+    }
+    return JSONResponse({"status": "ready", "models": names})
+
+
+@router.get("/", include_in_schema=False)
+async def root() -> RedirectResponse:
+    return RedirectResponse("docs")

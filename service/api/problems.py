@@ -1,0 +1,135 @@
+"""Every error as `application/problem+json` (RFC 9457)."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse
+
+from service.api.field_errors import explain
+from service.errors import (
+    InvalidMesh,
+    InvalidRequest,
+    ModelFault,
+    NotFound,
+    ShapeError,
+    TooLarge,
+    UnsupportedFormat,
+)
+
+MEDIA_TYPE = "application/problem+json"
+
+STATUSES: dict[type[ShapeError], int] = {
+    UnsupportedFormat: 415,
+    InvalidMesh: 422,
+    TooLarge: 413,
+    InvalidRequest: 422,
+    NotFound: 404,
+    ModelFault: 503,
+}
+
+# RFC 9110's phrases; older Pythons have others.
+_TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
+
+# The framework's own errors: code and suggestion by status.
+_PLAIN: dict[int, tuple[str, str]] = {
+    400: ("body_malformed", "Send multipart/form-data, as `curl -F mesh=@chair.glb` does."),
+    404: ("not_found", "The calls are listed at /docs and in /openapi.json."),
+    405: ("method_not_allowed", "Use a method that the Allow header names; see /docs."),
+    413: ("body_too_large", "Send a smaller file, or ask the operator to raise MAX_UPLOAD_BYTES."),
+}
+
+_WHAT: dict[int, str] = {
+    400: "The body is not well-formed multipart.",
+    404: "There is no such category, mesh or path.",
+    413: "The upload is over a limit.",
+    415: "The format can't be read, or can't be carried through without loss.",
+    422: "The mesh is broken, or an option or edit makes no sense; `code` and `detail` say which.",
+    500: "The service failed; nothing about the inside is told.",
+    503: "The models are still loading, or one of them can't be trusted.",
+}
+
+
+class Problem(JSONResponse):
+    """A problem document; `title` is the status's phrase, as goes with `about:blank`."""
+
+    media_type = MEDIA_TYPE
+
+    def __init__(
+        self,
+        status: int,
+        code: str,
+        detail: str,
+        suggestion: str,
+        trace_id: str,
+        headers: dict[str, str] | None = None,
+    ) -> None:
+        document = {
+            "type": "about:blank",
+            "title": _TITLES.get(status, HTTPStatus(status).phrase),
+            "status": status,
+            "detail": detail,
+            "code": code,
+            "suggestion": suggestion,
+            "trace_id": trace_id,
+        }
+        super().__init__(document, status_code=status, headers=headers)
+
+
+def internal_error(trace_id: str) -> Problem:
+    """What is told of an error that nothing foresaw."""
+    return Problem(
+        500,
+        "internal_error",
+        "The service failed while it worked on this request.",
+        "Try again; if it happens again, report it with the trace_id.",
+        trace_id,
+    )
+
+
+async def _shape_error(request: Request, error: Exception) -> Problem:
+    assert isinstance(error, ShapeError)
+    status = next(STATUSES[kind] for kind in type(error).__mro__ if kind in STATUSES)
+    headers = {"Retry-After": "1"} if error.code == "starting" else None
+    return Problem(
+        status, error.code, error.detail, error.suggestion, request.state.trace_id, headers
+    )
+
+
+async def _http_error(request: Request, error: Exception) -> Problem:
+    assert isinstance(error, HTTPException)
+    status = error.status_code
+    code, suggestion = _PLAIN.get(status, (HTTPStatus(status).name.lower(), "See /docs."))
+    detail = error.detail
+    if status == 404:
+        detail = f"There is nothing at {request.url.path[:200]!r}."
+    elif status == 405:
+        detail = f"{request.method} is not a method of {request.url.path[:200]!r}."
+    headers = dict(error.headers or {})
+    return Problem(status, code, detail, suggestion, request.state.trace_id, headers)
+
+
+async def _validation_error(request: Request, error: Exception) -> Problem:
+    assert isinstance(error, RequestValidationError)
+    code, detail, suggestion = explain(error.errors())
+    return Problem(422, code, detail, suggestion, request.state.trace_id)
+
+
+def install(app: FastAPI) -> None:
+    """Answer all errors that a handler can see with problems; `Trace` answers the rest."""
+    app.add_exception_handler(ShapeError, _shape_error)
+    app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(RequestValidationError, _validation_error)
+
+
+def documented(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """OpenAPI entries for the problems that a route can answer with."""
+    schema = {"$ref": "#/components/schemas/ProblemDocument"}
+    return {
+        status: {"description": _WHAT[status], "content": {MEDIA_TYPE: {"schema": schema}}}
+        for status in statuses
+    }

@@ -1,0 +1,209 @@
+"""The answers' JSON, for OpenAPI and for the tests that hold the service to it.
+
+The routes send the pipeline's reports as they are; nothing is filtered through these models.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.api.mesh_response import MEDIA_TYPES
+
+Vector = tuple[float, float, float]
+Unit = Literal["m", "cm", "mm", "in", "ft", "rad", "1"]
+
+BINARY = {"schema": {"type": "string", "format": "binary"}}
+MESH_CONTENT: dict[str, Any] = dict.fromkeys(MEDIA_TYPES.values(), BINARY)
+MESH_HEADERS: dict[str, Any] = {
+    "ETag": {
+        "description": "Strong: the content's SHA-256, as in a `mesh_id`.",
+        "schema": {"type": "string"},
+    },
+    "Content-Disposition": {
+        "description": "`attachment`, with a file name after the upload's.",
+        "schema": {"type": "string"},
+    },
+}
+
+
+class Schema(BaseModel):
+    """Base of all answers.  They may gain fields; clients should pass over what they don't know."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+
+class Estimate(Schema):
+    """An inferred parameter."""
+
+    value: float
+    sigma: float
+    """Standard deviation of the value, in the same unit."""
+    unit: Unit
+
+
+class Measure(Schema):
+    """A dimension that follows from the parameters or is measured on the mesh."""
+
+    value: float
+    unit: Unit
+
+
+class Frame(Schema):
+    """Where the canonical frame (+y up, +z front) lies in the upload's."""
+
+    up: str
+    front: str
+    scale: float
+    """Length in the upload's own coordinates of a unit of the normalised frame."""
+    center: Vector
+    """Origin of the normalised frame, in the upload's own coordinates."""
+
+
+class Candidate(Schema):
+    """A category and orientation that was tried."""
+
+    category: str
+    up: str
+    front: str
+    distance: float
+
+
+class Fit(Schema):
+    """How well the fitted template explains the mesh."""
+
+    distance: float
+    """Symmetric mean surface distance, divided by the upload's bounding-box diagonal."""
+    encoder_distance: float
+    """The same before the values were refined."""
+    in_distribution: bool
+    """False: the mesh is unlike what the model was trained on; take the values with care."""
+    score: float
+    candidates: list[Candidate]
+
+
+class ModelIdentity(Schema):
+    """Which model answered."""
+
+    name: str
+    version: str
+    digest: str
+
+
+class InferReport(Schema):
+    """What `POST /infer` answers."""
+
+    mesh_id: str = Field(examples=["sha256-0f4b..."])
+    category: str = Field(examples=["chair"])
+    parameters: dict[str, Estimate] = Field(
+        examples=[{"seat_width": {"value": 0.48, "sigma": 0.006, "unit": "m"}}]
+    )
+    derived: dict[str, Measure] = Field(
+        examples=[{"seat_top_height": {"value": 0.45, "unit": "m"}}]
+    )
+    frame: Frame
+    fit: Fit
+    model: ModelIdentity
+    warnings: list[str]
+
+
+class Change(Schema):
+    """A value before and after an edit."""
+
+    before: float
+    after: float
+    unit: Unit
+
+
+class VertexCount(Schema):
+    """How much of the mesh moved."""
+
+    total: int
+    moved: int
+
+
+class EditReport(Schema):
+    """What `POST /edit` answers to `Accept: application/json`."""
+
+    mesh_id: str = Field(examples=["sha256-93ac..."])
+    """Of the edited mesh."""
+    source_mesh_id: str = Field(examples=["sha256-0f4b..."])
+    """Of the mesh that was sent."""
+    category: str
+    model: ModelIdentity
+    parameters: dict[str, Change] = Field(
+        examples=[{"seat_width": {"before": 0.48, "after": 0.576, "unit": "m"}}]
+    )
+    derived: dict[str, Change]
+    vertices: VertexCount
+    flipped_faces: int
+    """Faces that the edit turned over."""
+    warnings: list[str]
+
+
+class Parameter(Schema):
+    """A parameter or derived dimension of a category."""
+
+    name: str
+    label: str
+    group: str
+    """The part of the shape, to sort sliders by."""
+    unit: Unit
+    kind: Literal["length", "angle", "coefficient"]
+    range: tuple[float, float]
+    """What the model was trained on."""
+    typical: tuple[float, float]
+    """What most real shapes have: a slider's ends."""
+    step: float
+    derived: bool
+    paper_name: str | None
+    """What the paper calls it."""
+
+
+class Category(Schema):
+    """What `GET /categories/{name}` answers."""
+
+    name: str
+    label: str
+    points: int
+    """Size of the point clouds that the encoder takes."""
+    model: ModelIdentity
+    keep: list[str]
+    """Points that an edit can hold in place; the first is the default."""
+    parameters: list[Parameter]
+
+
+class Categories(Schema):
+    """What `GET /categories` answers."""
+
+    categories: list[Category]
+
+
+class Alive(Schema):
+    """What `GET /livez` answers."""
+
+    status: Literal["alive"]
+
+
+class Ready(Schema):
+    """What `GET /readyz` answers when it is."""
+
+    status: Literal["ready"]
+    models: dict[str, ModelIdentity]
+
+
+class ProblemDocument(Schema):
+    """Every error (RFC 9457)."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    """What was found."""
+    code: str = Field(examples=["mesh_missing"])
+    """Stable, for programs."""
+    suggestion: str
+    """What to do about it."""
+    trace_id: str
+    """Also in the header `Trace-Id`; taken from the request's `traceparent` when it has one."""

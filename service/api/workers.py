@@ -1,0 +1,27 @@
+"""The bounded pool of threads that work on meshes, off the event loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, TypeVarTuple
+
+from anyio import CapacityLimiter, to_thread
+
+T = TypeVar("T")
+Arguments = TypeVarTuple("Arguments")
+
+
+class Workers:
+    """Runs at most `count` functions at once; more wait their turn.
+
+    Probes and small answers stay on the event loop, so that they come at once however busy the
+    pool is.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self._limiter = CapacityLimiter(count)
+
+    async def run(self, function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
+        """The function's result, computed in a thread; its error is raised here."""
+        return await to_thread.run_sync(function, *arguments, limiter=self._limiter)

@@ -1,0 +1,44 @@
+"""What an operator can set, by environment variables of the same names in capitals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, PositiveInt
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+MEBIBYTE = 1024 * 1024
+
+LogLevel = Literal["critical", "error", "warning", "info", "debug"]
+
+
+def _lower(value: object) -> object:
+    return value.lower() if isinstance(value, str) else value
+
+
+class Settings(BaseSettings):
+    """The service's settings; pydantic's ValidationError for a value that makes no sense."""
+
+    model_config = SettingsConfigDict(env_prefix="", use_attribute_docstrings=True, frozen=True)
+
+    host: str = "127.0.0.1"
+    """Address to listen on; 0.0.0.0 is every interface."""
+
+    port: int = Field(default=8000, ge=0, le=65535)
+    """Port to listen on; 0 takes a free one."""
+
+    models_dir: Path = Path(__file__).parent / "models"
+    """Folder of the models: `<category>.onnx` beside `<category>.json`."""
+
+    max_upload_bytes: PositiveInt = 128 * MEBIBYTE
+    """Largest request body, in bytes; more is answered with 413."""
+
+    mesh_cache_bytes: int = Field(default=256 * MEBIBYTE, ge=0)
+    """Memory for meshes that requests name by `mesh_id`, in bytes; the least recently used go."""
+
+    workers: PositiveInt | None = None
+    """Threads that infer and edit; by default one for every CPU that the process may use."""
+
+    log_level: Annotated[LogLevel, BeforeValidator(_lower)] = "info"
+    """Least severity that is logged."""

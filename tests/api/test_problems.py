@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+from typing import Any
+
+import httpx
+import pytest
+
+from service import errors
+
+CASES = [
+    (errors.UnsupportedFormat, 415, "Unsupported Media Type"),
+    (errors.InvalidMesh, 422, "Unprocessable Content"),
+    (errors.TooLarge, 413, "Content Too Large"),
+    (errors.InvalidRequest, 422, "Unprocessable Content"),
+    (errors.NotFound, 404, "Not Found"),
+    (errors.ModelFault, 503, "Service Unavailable"),
+]
+
+
+@pytest.mark.parametrize(("kind", "status", "title"), CASES)
+def test_each_error_has_its_status(
+    client: httpx.Client,
+    pretend: Any,
+    problem: Any,
+    kind: type[errors.ShapeError],
+    status: int,
+    title: str,
+) -> None:
+    def fail() -> None:
+        raise kind("some_code", "what was found", "what to do")
+
+    pretend.work = fail
+    document = problem(
+        client.post("/infer", files={"mesh": ("a.obj", b"abc")}), status, "some_code"
+    )
+    assert (document.detail, document.suggestion) == ("what was found", "what to do")
+    assert (document.type, document.title) == ("about:blank", title)
+
+
+def test_every_error_class_has_a_status() -> None:
+    assert set(errors.ShapeError.__subclasses__()) == {kind for kind, _, _ in CASES}
+
+
+def test_a_path_that_is_not_there(client: httpx.Client, problem: Any) -> None:
+    assert "/nowhere" in problem(client.get("/nowhere"), 404, "not_found").detail
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allowed"),
+    [("GET", "/infer", "POST"), ("PUT", "/edit", "POST"), ("DELETE", "/meshes/x", "GET")],
+)
+def test_a_method_that_is_not_allowed(
+    client: httpx.Client, problem: Any, method: str, path: str, allowed: str
+) -> None:
+    response = client.request(method, path)
+    problem(response, 405, "method_not_allowed")
+    assert response.headers["allow"] == allowed
+
+
+@pytest.mark.parametrize(
+    ("content_type", "body"),
+    [
+        ("multipart/form-data", b"abc"),
+        ("multipart/form-data; boundary=", b"abc"),
+        ("multipart/form-data; boundary=xx", b"abc"),
+        ("multipart/form-data; boundary=xx", b"--xx\r\nContent-Disposition: form-data\r\n\r\n1"),
+    ],
+)
+def test_a_malformed_multipart_body(
+    client: httpx.Client, problem: Any, content_type: str, body: bytes
+) -> None:
+    response = client.post("/infer", content=body, headers={"content-type": content_type})
+    problem(response, 400, "body_malformed")

@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+import threading
+
+import anyio
+import anyio.to_thread
+import pytest
+
+from service.api.workers import Workers
+
+
+def test_no_more_than_count_run_at_once() -> None:
+    entered = threading.Semaphore(0)
+    gate = threading.Event()
+
+    def work() -> None:
+        entered.release()
+        assert gate.wait(20)
+
+    def watch() -> list[bool]:
+        try:
+            return [entered.acquire(timeout=10), entered.acquire(timeout=10),
+                    entered.acquire(timeout=0.3)]  # fmt: skip
+        finally:
+            gate.set()
+
+    async def six() -> list[bool]:
+        workers = Workers(2)
+        async with anyio.create_task_group() as tasks:
+            for _ in range(6):
+                tasks.start_soon(workers.run, work)
+            return await anyio.to_thread.run_sync(watch)
+
+    assert anyio.run(six) == [True, True, False]
+    assert all(entered.acquire(blocking=False) for _ in range(4))
+
+
+def test_results_and_errors_come_back() -> None:
+    async def divide(a: int, b: int) -> float:
+        return await Workers(1).run(lambda x, y: x / y, a, b)
+
+    assert anyio.run(divide, 6, 3) == 2.0
+    with pytest.raises(ZeroDivisionError):
+        anyio.run(divide, 1, 0)

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from typing import Any
+
+import httpx
+import pytest
+
+from service import __main__, main
+from service.settings import Settings
+
+
+def test_making_an_app_loads_no_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    loads: list[Any] = []
+    monkeypatch.setattr(main, "load_models", lambda *arguments: loads.append(arguments))
+    main.create_app(Settings())
+    assert loads == []
+
+
+def test_workers_share_the_cpus(monkeypatch: pytest.MonkeyPatch, serve: Any) -> None:
+    asked: list[Any] = []
+
+    def load(directory: Any, threads: int) -> Any:
+        asked.append((directory, threads))
+        return {}
+
+    monkeypatch.setattr(main, "cpu_count", lambda: 8)
+    monkeypatch.setattr(main, "load_models", load)
+    app = main.create_app(Settings(workers=3, models_dir="/somewhere"))
+    serve(app).get("/categories")
+    assert [(str(directory), threads) for directory, threads in asked] == [("/somewhere", 2)]
+    assert app.state.context.workers.count == 3
+    assert main.create_app(Settings(workers=None)).state.context.workers.count == 8
+
+
+def test_the_app_stops_while_models_load(serve: Any) -> None:
+    assert serve(main.create_app(Settings())).get("/livez").status_code == 200
+
+
+def test_a_setting_that_makes_no_sense_ends_the_command(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert __main__.main(["--port", "99999"]) == 2
+    assert "PORT='99999'" in capsys.readouterr().err
+
+
+def test_the_command_serves_on_the_port_that_it_is_told() -> None:
+    environment = {**os.environ, "PORT": "1", "HOST": "203.0.113.1"}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "service", "--host", "127.0.0.1", "--port", "0"],
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if match := re.search(r"running on (http://127\.0\.0\.1:\d+)", line):
+                break
+        else:
+            pytest.fail("the command ended before it served")
+        response = httpx.get(f"{match[1]}/livez", trust_env=False)
+        assert response.json() == {"status": "alive"}
+        assert "server" not in response.headers
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
