@@ -15,9 +15,10 @@ from tqdm import tqdm
 from model_export.metrics import Recovery, recovery
 from model_export.realistic import RealisticShape, find_shapes, load_cloud
 from model_export.synthetic import Augmentation, SyntheticShapes
+from service.encode.distance import Cloud
 from service.encode.inference import Estimate, estimate
 from service.encode.model import Model, load_models
-from service.encode.refine import Cloud, refine
+from service.encode.refine import refine
 from service.mesh.formats import read_mesh
 from service.mesh.surface import Normalization, Samples, sample_surface
 

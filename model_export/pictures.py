@@ -74,7 +74,11 @@ def draw(axes: Axes, panel: Panel, camera: Array) -> None:
 
 
 def save_sheet(
-    panels: Sequence[Panel], path: Path, columns: int = 5, size: float = 2.2, camera: Array | None = None
+    panels: Sequence[Panel],
+    path: Path,
+    columns: int = 5,
+    size: float = 2.2,
+    camera: Array | None = None,
 ) -> None:
     """Write the panels as one PNG, row by row."""
     rows = -(-len(panels) // columns)
@@ -85,6 +89,6 @@ def save_sheet(
         axes.axis("off")
     for axes, panel in zip(grid.flat, panels, strict=False):
         draw(axes, panel, view() if camera is None else camera)
-    figure.tight_layout(pad=0.3)
+    figure.tight_layout(pad=0.6)
     figure.savefig(path, dpi=110)
     pyplot.close(figure)

@@ -130,7 +130,7 @@ class RealisticShapes:
         if not clouds:
             raise ValueError(f"no readable mesh on this side of the split in {folder}")
         self.clouds = torch.as_tensor(np.stack(clouds), dtype=torch.float32, device=device)
-        self._order: list[int] = []
+        self.order: list[int] = []  # of the shapes still to come in this round
 
     def __len__(self) -> int:
         return len(self.names)
@@ -140,9 +140,9 @@ class RealisticShapes:
 
         Half of them are mirrored left to right, which an object of these categories survives.
         """
-        while len(self._order) < count:
-            self._order.extend(self.rng.permutation(len(self)).tolist())
-        chosen, self._order = self._order[:count], self._order[count:]
+        while len(self.order) < count:
+            self.order.extend(self.rng.permutation(len(self)).tolist())
+        chosen, self.order = self.order[:count], self.order[count:]
         pick = torch.as_tensor(self.rng.integers(0, CLOUD_SIZE, (count, points)))
         clouds = self.clouds[torch.as_tensor(chosen)[:, None], pick]
         flip = torch.as_tensor(self.rng.choice([-1.0, 1.0], (count, 1)), dtype=torch.float32)

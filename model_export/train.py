@@ -120,6 +120,7 @@ class Trainer:
             "random": [self.generator.get_state(), torch.get_rng_state()],
             "synthetic": [self.synthetic.generator.get_state(), _rng_state(self.synthetic.rng)],
             "realistic": _rng_state(self.realistic.rng) if self.realistic else None,
+            "order": list(self.realistic.order) if self.realistic else [],
             "step": self.step,
             "seconds": self.seconds,
             "place": self._place(),
@@ -140,6 +141,7 @@ class Trainer:
         self.synthetic.rng.bit_generator.state = json.loads(state["synthetic"][1])
         if self.realistic and state["realistic"]:
             self.realistic.rng.bit_generator.state = json.loads(state["realistic"])
+            self.realistic.order = list(state.get("order", []))
         self.step, self.seconds = state["step"], state["seconds"]
 
 

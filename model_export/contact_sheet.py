@@ -1,0 +1,85 @@
+"""Draw fits and edits of real shapes.
+
+``python -m model_export.contact_sheet chair --realistic DIR``
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from model_export.pictures import BLUE, GREY, YELLOW, Panel, save_sheet
+from model_export.realistic import RealisticShape, find_shapes
+from service.edits import Change
+from service.encode.model import Model, load_models
+from service.mesh.formats import read_mesh
+from service.pipeline import EditOptions, Inference, InferOptions, Upload, edit, infer
+
+UPRIGHT = InferOptions(up="+y", front="+z")
+
+
+def fit_panel(model: Model, shape: RealisticShape) -> Panel:
+    """A real shape with its fitted template drawn over it."""
+    found = _infer(model, shape)
+    fit = found.best.estimate
+    template = model.template
+    fitted = template.decode(fit.parameters) + fit.translation
+    return Panel(
+        f"{shape.name[:30]}\n{fit.distance:.4f} (encoder {fit.encoder_distance:.4f})",
+        [
+            (found.vertices, found.mesh.faces, YELLOW, 1.0),
+            (fitted, template.faces[~template.hidden], BLUE, 0.25),
+        ],
+    )
+
+
+def edit_panels(model: Model, shape: RealisticShape, factors: Sequence[float]) -> list[Panel]:
+    """A real shape and its edits: each parameter times each factor."""
+    found = _infer(model, shape)
+    mesh = found.mesh
+    panels: list[Panel] = []
+    for factor in factors:
+        panels.append(Panel(shape.name[:30], [(mesh.vertices, mesh.faces, YELLOW, 1.0)]))
+        for name in model.template.names:
+            change = {name: Change("scale", factor)}
+            edited = edit(found.upload, {model.name: model}, UPRIGHT, change, EditOptions())
+            moved = read_mesh(edited.data, found.upload.name)
+            title = f"{name} x {factor:g}"
+            panels.append(Panel(title, [(moved.vertices, moved.faces, GREY, 1.0)]))
+    return panels
+
+
+def _infer(model: Model, shape: RealisticShape) -> Inference:
+    upload = Upload(shape.path.read_bytes(), shape.path.name)
+    return infer(upload, {model.name: model}, UPRIGHT)
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m model_export.contact_sheet")
+    parser.add_argument("name", help="of the category")
+    parser.add_argument("--models", type=Path, help="models folder (default: the shipped one)")
+    parser.add_argument("--realistic", type=Path, required=True, help="folder of real meshes")
+    parser.add_argument("--out", type=Path, default=Path("runs/sheet.png"), help="PNG to write")
+    parser.add_argument("--count", type=int, default=20, help="held-out shapes to draw")
+    parser.add_argument("--shape", help="draw this shape's edits instead of fits")
+    arguments = parser.parse_args()
+    shipped = Path(__file__).parent.parent / "service" / "models"
+    model = load_models(arguments.models or shipped)[arguments.name]
+    shapes = find_shapes(arguments.realistic)
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    if arguments.shape:
+        chosen = next(shape for shape in shapes if shape.name == arguments.shape)
+        panels = edit_panels(model, chosen, (0.7, 1.4))
+        save_sheet(panels, arguments.out, columns=1 + len(model.template.names))
+        return
+    held_out = [shape for shape in shapes if shape.held_out and shape.info.get("core", True)]
+    order = np.random.default_rng(0).permutation(len(held_out))[: arguments.count]
+    save_sheet([fit_panel(model, held_out[index]) for index in order], arguments.out)
+
+
+if __name__ == "__main__":
+    main()
