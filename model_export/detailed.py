@@ -1,0 +1,376 @@
+"""Chairs in detail, with known parameters and their own true edit, to judge the transfer by.
+
+Each is generated from the template's parameters and a style drawn once from a seed: running the
+generator again with other parameters is the true edit, vertex by vertex.  The truth is a
+carpenter's: a wider chair has a wider seat, cushion, apron and rails, while legs, posts and arms
+move apart and keep their thickness; stretchers lengthen, slats and spindles spread and keep their
+number and section; a leg's or a back's lean, as a distance, stays.  The family is disjoint from
+the shapes that encoders are trained on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+Faces = NDArray[np.int64]
+Mesh = tuple[Array, Faces]
+
+NAMES = (
+    "back_height", "back_thickness", "seat_thickness", "seat_depth",
+    "seat_width", "leg_height", "leg_depth", "leg_width",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class DetailedChair:
+    """A chair that can be generated again with other parameters.
+
+    Attributes:
+        parameters: ``[8]`` metres, in the chair template's order.
+        faces: ``[F, 3]``, the same for all parameters.
+        welded: whether it is one connected piece.
+    """
+
+    parameters: Array
+    faces: Faces
+    welded: bool
+    _build: Callable[[SimpleNamespace], Mesh]
+
+    def mesh(self, f: ArrayLike) -> Array:
+        """Vertices ``[V, 3]`` in metres for ``f [8]``; the origin is the centre of the seat."""
+        return self._build(_named(f))[0]
+
+
+def detailed_chair(seed: int) -> DetailedChair:
+    """The chair of a seed; every third is welded."""
+    rng = np.random.default_rng([2020, seed])
+    low = [0.36, 0.018, 0.025, 0.38, 0.38, 0.30, 0.028, 0.028]
+    high = [0.62, 0.050, 0.080, 0.52, 0.56, 0.50, 0.055, 0.055]
+    parameters = rng.uniform(low, high)
+    welded = seed % 3 == 2
+    style = _style(rng)
+    builder = _welded if welded else _assembled
+
+    def build(p: SimpleNamespace) -> Mesh:
+        return builder(p, style)
+
+    return DetailedChair(parameters, build(_named(parameters))[1], welded, build)
+
+
+def _named(f: ArrayLike) -> SimpleNamespace:
+    return SimpleNamespace(**dict(zip(NAMES, np.asarray(f, np.float64), strict=True)))
+
+
+def _style(rng: np.random.Generator) -> SimpleNamespace:
+    """What no parameter says; lengths in metres."""
+    return SimpleNamespace(
+        leg=rng.choice(["square", "tapered", "turned"]),
+        splay=rng.choice([0.0, 1.0]) * rng.uniform(0.01, 0.07, 2),
+        inset=rng.choice([0.0, 1.0]) * rng.uniform(0.0, 0.05),
+        posts_are_legs=bool(rng.random() < 0.4),
+        recline=rng.uniform(0.0, 0.12),
+        bow=rng.choice([0.0, 1.0]) * rng.uniform(0.0, 0.03),
+        back=rng.choice(["slats", "spindles", "panel"]),
+        slats=int(rng.integers(2, 6)),
+        spindles=int(rng.integers(4, 9)),
+        fillet=rng.uniform(0.002, 0.01),
+        cushion=rng.choice([0.0, 1.0]) * rng.uniform(0.03, 0.07),
+        back_cushion=rng.choice([0.0, 0.0, 1.0]) * rng.uniform(0.03, 0.06),
+        apron=rng.choice([0.0, 1.0]) * rng.uniform(0.04, 0.08),
+        stretcher=rng.choice([0.0, 1.0]) * rng.uniform(0.2, 0.6),
+        arms=rng.choice([0.0, 1.0]) * rng.uniform(0.16, 0.24),
+        arm_out=rng.uniform(0.0, 0.04),
+        density=int(rng.integers(2, 5)),
+    )
+
+
+# --- pieces ---------------------------------------------------------------------------------------
+
+
+def _lattice_surface(occupied: NDArray[np.bool_]) -> tuple[Faces, Faces]:
+    """Boundary of the occupied cells: ``[n, 3]`` lattice nodes and ``[m, 3]`` triangles."""
+    filled = np.pad(occupied, 1)
+    corners: list[Faces] = []
+    for axis in range(3):
+        u, v = np.eye(3, dtype=np.int64)[[(axis + 1) % 3, (axis + 2) % 3]]
+        step = np.diff(filled.astype(np.int8), axis=axis)
+        for value, square in ((-1, [0 * u, u, u + v, v]), (1, [0 * u, v, u + v, u])):
+            cell = np.argwhere(step == value) - 1
+            cell[:, axis] += 1
+            corners.append(cell[:, None] + np.array(square))
+    quads = np.concatenate(corners)
+    nodes, index = np.unique(quads.reshape(-1, 3), axis=0, return_inverse=True)
+    index = index.reshape(-1, 4)
+    return nodes, np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
+
+
+@cache
+def _cube(cells: tuple[int, int, int], rim: int) -> tuple[Array, Array, Faces]:
+    """A rounded cube: inner coordinates in [-1, 1]^3, outward directions, triangles."""
+    nodes, faces = _lattice_surface(np.ones([count + 2 * rim for count in cells], bool))
+    count = np.array(cells)
+    inner = np.clip((nodes - rim) / count, 0.0, 1.0) * 2.0 - 1.0
+    outer = (np.minimum(nodes - rim, 0) + np.maximum(nodes - rim - count, 0)) / rim
+    outer = np.sin(outer * np.pi / 4) / np.sin(np.pi / 4)
+    return inner, outer / np.linalg.norm(outer, axis=1, keepdims=True), faces
+
+
+def _slab(center: ArrayLike, size: ArrayLike, fillet: float, density: int) -> Mesh:
+    """A box with rounded edges of a fixed radius; a cell for about each 8 cm / density."""
+    cells = (4 * density, 2 * density, 4 * density)
+    inner, outer, faces = _cube(cells, 3)
+    half = np.asarray(size) / 2.0
+    radius = np.minimum(fillet, 0.45 * half.min())
+    return np.asarray(center) + inner * (half - radius) + outer * radius, faces
+
+
+def _tube(path: Array, half: Array, sides: int, square: bool) -> Mesh:
+    """A closed tube along ``path [n, 3]`` with half sections ``half [n, 2]``, across the two axes
+    that the path mostly does not run along."""
+    run = int(np.abs(path[-1] - path[0]).argmax())
+    across = [axis for axis in range(3) if axis != run]
+    angle = (np.arange(sides) + 0.5) * 2.0 * np.pi / sides
+    section = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    if square:
+        section /= np.linalg.norm(section, ord=6, axis=1, keepdims=True)
+    rings = np.repeat(path[:, None], sides, axis=1)
+    rings[:, :, across] += section * half[:, None]
+    i = np.arange(sides)
+    j = (i + 1) % sides
+    start = np.arange(len(path) - 1)[:, None] * sides
+    a, b, c, d = (x.ravel() for x in (start + i, start + j, start + sides + j, start + sides + i))
+    end = len(path) * sides
+    last = end - sides
+    caps = [np.stack([0 * i + end, j, i], 1), np.stack([0 * i + end + 1, last + i, last + j], 1)]
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1), *caps])
+    forward = path[-1, run] > path[0, run]
+    if forward == (run == 1):
+        faces = faces[:, ::-1]
+    return np.concatenate([rings.reshape(-1, 3), path[[0, -1]]]), faces
+
+
+def _bar(start: ArrayLike, end: ArrayLike, half: ArrayLike, density: int, square: bool) -> Mesh:
+    s = np.linspace(0.0, 1.0, 5 * density + 1)[:, None]
+    path = np.asarray(start) * (1 - s) + np.asarray(end) * s
+    return _tube(path, np.broadcast_to(np.asarray(half), (len(s), 2)), 6 * density, square)
+
+
+def _join(pieces: list[Mesh]) -> Mesh:
+    offsets = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
+    faces = [face + offset for (_, face), offset in zip(pieces, offsets[:-1], strict=True)]
+    return np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
+
+
+# --- a chair of many pieces -----------------------------------------------------------------------
+
+
+def _assembled(p: SimpleNamespace, s: SimpleNamespace) -> Mesh:
+    top = p.seat_thickness / 2
+    seat = (p.seat_width, p.seat_thickness, p.seat_depth)
+    pieces = [_slab((0, 0, 0), seat, s.fillet, s.density)]
+    pieces += [_leg(p, s, x, z) for x in (-1, 1) for z in (-1, 1)]
+    pieces += _back(p, s)
+    if s.cushion:
+        size = (p.seat_width - 0.03, s.cushion, p.seat_depth - 0.07)
+        center = (0, top + s.cushion / 2, 0.02)
+        pieces.append(_slab(center, size, 0.02, s.density))
+    if s.apron:
+        pieces += _rails(p, s, -top - s.apron / 2, (0.01, s.apron / 2), 0.0)
+    if s.stretcher:
+        y = -top - p.leg_height * (1 - s.stretcher)
+        pieces += _rails(p, s, y, (0.009, 0.009), 1 - s.stretcher)
+    if s.arms:
+        pieces += [piece for side in (-1, 1) for piece in _arm(p, s, side)]
+    return _join(pieces)
+
+
+def _leg_center(p: SimpleNamespace, s: SimpleNamespace, x: int, z: int, down: ArrayLike) -> Array:
+    """Points ``[n, 3]`` of a leg's axis, `down` from 0 at the seat to 1 at the floor."""
+    down = np.asarray(down, np.float64)
+    return np.stack(
+        [
+            x * (p.seat_width / 2 - p.leg_width / 2 - s.inset + s.splay[0] * down),
+            -p.seat_thickness / 2 - p.leg_height * down,
+            z * (p.seat_depth / 2 - p.leg_depth / 2 - s.inset + s.splay[1] * down),
+        ],
+        axis=-1,
+    )
+
+
+def _leg(p: SimpleNamespace, s: SimpleNamespace, x: int, z: int) -> Mesh:
+    down = np.linspace(0.0, 1.0, 12 * s.density)
+    profile = np.ones_like(down)
+    if s.leg == "tapered":
+        profile = 1.1 - 0.4 * down
+    if s.leg == "turned":
+        profile = 1.0 + 0.2 * np.sin(25 * down) * np.sin(np.pi * down)
+    half = profile[:, None] * np.array([p.leg_width, p.leg_depth]) / 2
+    path = _leg_center(p, s, x, z, down)
+    if s.posts_are_legs and z < 0:
+        # One timber from the floor to the back's top; its section passes into the post's.
+        up, post = _post(p, s, x)
+        path = np.concatenate([up[::-1], path])
+        half = np.concatenate([np.broadcast_to(post, (len(up), 2)), half])
+    return _tube(path, half, 6 * s.density, s.leg != "turned")
+
+
+def _post(p: SimpleNamespace, s: SimpleNamespace, x: int) -> tuple[Array, Array]:
+    up = np.linspace(0.0, 1.0, 12 * s.density)
+    return _back_point(p, s, x * (p.seat_width / 2 - 0.016), up), np.array(
+        [0.016, p.back_thickness / 2]
+    )
+
+
+def _back_point(p: SimpleNamespace, s: SimpleNamespace, x: ArrayLike, up: ArrayLike) -> Array:
+    """Points ``[n, 3]`` of the back's middle surface, `up` from 0 at the seat to 1 at the top."""
+    x, up = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(up, np.float64))
+    bow = s.bow * (1 - (2 * x / p.seat_width) ** 2)
+    z = (p.back_thickness - p.seat_depth) / 2 - s.recline * up - bow * up
+    return np.stack([x, p.seat_thickness / 2 + p.back_height * up, z], axis=-1)
+
+
+def _back(p: SimpleNamespace, s: SimpleNamespace) -> Iterator[Mesh]:
+    thick = p.back_thickness
+    if s.back == "panel":
+        center = (0, 0, 0)
+        flat, faces = _slab(center, (p.seat_width, 2.0, thick), s.fillet, 2 * s.density)
+        # The panel follows the back's lean and bow.
+        middle = _back_point(p, s, flat[:, 0], (flat[:, 1] + 1) / 2)
+        middle[:, 2] += flat[:, 2]
+        yield middle, faces
+    else:
+        if not s.posts_are_legs:
+            for x in (-1, 1):
+                path, half = _post(p, s, x)
+                yield _tube(path, np.broadcast_to(half, (len(path), 2)), 6 * s.density, True)
+        yield _crossbar(p, s, 1.0, 0.03)
+        if s.back == "slats":
+            for up in (np.arange(s.slats) + 0.7) / (s.slats + 0.7):
+                yield _crossbar(p, s, up, 0.018)
+        else:
+            span = p.seat_width / 2 - 0.032
+            up = np.linspace(0.0, 1.0, 8 * s.density)
+            for x in np.linspace(-span, span, s.spindles + 2)[1:-1]:
+                half = np.broadcast_to([0.007, 0.007], (len(up), 2))
+                yield _tube(_back_point(p, s, x, up), half, 4 * s.density, False)
+    if s.back_cushion:
+        size = (p.seat_width - 0.05, p.back_height - 0.08, s.back_cushion)
+        center = _back_point(p, s, 0.0, 0.5)
+        center[2] += (thick + s.back_cushion) / 2
+        yield _slab(center, size, 0.02, s.density)
+
+
+def _crossbar(p: SimpleNamespace, s: SimpleNamespace, up: float, half: float) -> Mesh:
+    """A horizontal bar of the back, hung below the height `up`."""
+    x = np.linspace(-1.0, 1.0, 10 * s.density + 1) * (p.seat_width / 2 - 0.03)
+    path = _back_point(p, s, x, up)
+    path[:, 1] -= half
+    section = np.broadcast_to([half, 0.4 * p.back_thickness], (len(x), 2))
+    return _tube(path, section, 6 * s.density, True)
+
+
+def _rails(
+    p: SimpleNamespace, s: SimpleNamespace, y: float, half: ArrayLike, down: float
+) -> Iterator[Mesh]:
+    """Four bars from leg to leg; `half` is (across, up), `down` where on the legs they end."""
+    across, up = np.asarray(half)
+    square = bool(up > 2 * across)
+    leg = {(x, z): _leg_center(p, s, x, z, down) for x in (-1, 1) for z in (-1, 1)}
+    for side in (-1, 1):
+        ends = leg[-1, side], leg[1, side]
+        yield _bar(*(np.array([e[0], y, e[2]]) for e in ends), (up, across), s.density, square)
+        ends = leg[side, -1], leg[side, 1]
+        yield _bar(*(np.array([e[0], y, e[2]]) for e in ends), (across, up), s.density, square)
+
+
+def _arm(p: SimpleNamespace, s: SimpleNamespace, side: int) -> Iterator[Mesh]:
+    x = side * (p.seat_width / 2 + s.arm_out)
+    y = p.seat_thickness / 2 + s.arms
+    front = p.seat_depth / 2 - 0.05
+    rear = (p.back_thickness - p.seat_depth) / 2 - s.recline * s.arms / 0.5
+    yield _bar((x, y, rear), (x, y, front), (0.022, 0.014), s.density, True)
+    yield _bar((x, 0, front - 0.03), (x, y, front - 0.03), (0.013, 0.013), s.density, False)
+
+
+# --- a chair of one piece -------------------------------------------------------------------------
+
+
+def _lines(stops: list[float], cells: list[int]) -> Array:
+    """Lattice lines through `stops`, each interval cut into its number of `cells`."""
+    intervals = zip(stops[:-1], stops[1:], cells, strict=True)
+    runs = [np.linspace(a, b, count, endpoint=False) for a, b, count in intervals]
+    return np.concatenate([*runs, stops[-1:]])
+
+
+def _welded(p: SimpleNamespace, s: SimpleNamespace) -> Mesh:
+    """Cells of a lattice are wood or air; legs and rails have lines of their own."""
+    k = s.density
+    w, d, st = p.seat_width / 2, p.seat_depth / 2, p.seat_thickness / 2
+    x_cells = z_cells = [k, 2 * k, 4 * k, 2 * k, k]
+    y_cells = [5 * k, k, 5 * k, k, k] + [3 * k, k] * s.slats
+    rail = -st - p.leg_height * (1 - (s.stretcher or 0.4))
+    stops = [-st - p.leg_height, rail - 0.02, rail, -st - (s.apron or 0.05), -st, st]
+    up = (np.arange(s.slats)[:, None] + [0.6, 1.0]) / s.slats
+    y = _lines([*stops, *(st + p.back_height * up.ravel())], y_cells)
+    post, lw, ld = 0.03, p.leg_width, p.leg_depth
+    across = _columns(w, x_cells, [(lw, lw), (post, post), (post, post)])
+    along = _columns(d, z_cells, [(ld, ld), (post, post), (p.back_thickness, post)])
+    at = [np.repeat(np.arange(len(c)), c) for c in (x_cells, y_cells, z_cells)]
+    nodes, faces = _lattice_surface(_chair_cells(*np.meshgrid(*at, indexing="ij"), s))
+    i, j, h = nodes.T
+    corner = ((i <= k) | (i >= 9 * k)) & ((h <= k) | (h >= 9 * k))
+    # Legs and rails, the seat down to its underside between them, the back from the seat's top.
+    level = np.where((j < 12 * k) | ((j == 12 * k) & corner), 0, np.where(j < 13 * k, 1, 2))
+    return _bent(np.stack([across[level, i], y[j], along[level, h]], axis=1), p, s), faces
+
+
+def _columns(half: float, cells: list[int], ends: list[tuple[float, float]]) -> Array:
+    """Lattice lines of the three levels between ``-half`` and ``half``, which have columns of
+    widths `ends` at their sides.
+
+    Quarter lines hold the seat's middle still when a leg or the back thickens; rails between legs
+    stretch evenly.
+    """
+    quarters = [(half - ends[0][0]) / 2, half / 2, half / 2]
+    lines = [
+        _lines([-half, -half + low, -quarter, quarter, half - high, half], cells)
+        for quarter, (low, high) in zip(quarters, ends, strict=True)
+    ]
+    return np.stack(lines)
+
+
+def _chair_cells(i: Faces, j: Faces, h: Faces, s: SimpleNamespace) -> NDArray[np.bool_]:
+    """Which cells are wood, from the intervals that they lie in along x, y and z."""
+    side, end, rear = (i == 0) | (i == 4), (h == 0) | (h == 4), h == 0
+    occupied = j == 4
+    occupied |= (j < 4) & side & end
+    occupied |= (j == 3) & (side | end) & bool(s.apron)
+    occupied |= (j == 1) & (side | end) & bool(s.stretcher)
+    occupied |= (j > 4) & rear & (side | (j % 2 == 0) | (s.back == "panel"))
+    return occupied
+
+
+def _bent(v: Array, p: SimpleNamespace, s: SimpleNamespace) -> Array:
+    """Turn and splay the legs of a straight chair, and lean its back."""
+    st = p.seat_thickness / 2
+    down = np.maximum(-st - v[:, 1], 0.0) / p.leg_height
+    up = np.maximum(v[:, 1] - st, 0.0) / p.back_height
+    bent = v.copy()
+    turned = 0.2 * np.sin(25 * down) * np.sin(np.pi * down) * (s.leg == "turned")
+    half = np.array([p.seat_width, p.seat_depth]) / 2
+    leg = np.array([p.leg_width, p.leg_depth])
+    flat = v[:, [0, 2]]
+    axis = np.sign(flat) * (half - leg / 2)
+    of_leg = (np.abs(flat) >= half - leg - 1e-9).all(axis=1) & (down > 0)
+    shift = np.clip(flat / (half - leg), -1.0, 1.0) * s.splay * down[:, None]
+    bent[:, [0, 2]] += shift + (flat - axis) * (turned * of_leg)[:, None]
+    rear = np.clip((half[1] - v[:, 2]) / (p.seat_depth - p.back_thickness), 0.0, 1.0)
+    bent[:, 2] -= s.recline * up * rear
+    return bent

@@ -1,0 +1,94 @@
+"""What a mesh is once it is bound: displacements, exactly linear in the parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from service.template.affine import AffineTemplate
+
+Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
+
+# Parts are no thinner than this to a mesh, in normalised lengths.
+FLOOR = 1e-3
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A mesh bound to an affine template; any edit of it is one matrix product.
+
+    Attributes:
+        jacobian: ``[V, 3, d]`` float32, displacement per unit of each parameter; its columns are
+            morph targets, exact in any combination.
+        gains: ``[V, 3 P]`` float32, how far each vertex follows the stretch of each part along the
+            part's own three axes.
+        stretches: ``[3 P, 9, d]`` float32, the linear map (row-major 3 x 3) that a unit of each
+            parameter adds along each axis of each part.
+    """
+
+    jacobian: Array32
+    gains: Array32
+    stretches: Array32
+
+    def displace(self, df: ArrayLike) -> Array32:
+        """Displacements ``[V, 3]`` for a change of the parameters ``df [d]``.
+
+        Coordinates that no changed parameter moves are exactly zero.
+        """
+        return self.jacobian @ np.asarray(df, np.float32)
+
+    def linear(self, df: ArrayLike) -> Array32:
+        """Local linear maps ``[V, 3, 3]`` for ``df [d]``: tangents follow them, normals their
+        inverse transpose."""
+        added = self.gains @ (self.stretches @ np.asarray(df, np.float32))
+        maps: Array32 = added.reshape(-1, 3, 3) + np.eye(3, dtype=np.float32)
+        return maps
+
+
+def inverse_frames(frames: Array) -> Array:
+    """``[P, 3, 3]`` inverses of the linear parts of ``frames [P, 3, 4]``.
+
+    Parts thinner than `FLOOR` count as that thick, so that none is singular.
+    """
+    u, s, vt = np.linalg.svd(frames[:, :, :3])
+    inverses: Array = np.einsum("pki,pk,pjk->pij", vt, 1.0 / np.maximum(s, FLOOR), u)
+    return inverses
+
+
+def part_stretches(template: AffineTemplate, inverses: Array) -> Array32:
+    """`Binding.stretches`: for part p and its axis m, ``dA_p[:, m] (A_p^-1)[m, :]`` for each
+    parameter."""
+    outer = np.einsum("pimd,pmj->pmijd", template.frame_jacobian[:, :, :3], inverses)
+    parts = len(inverses)
+    return np.ascontiguousarray(outer.reshape(3 * parts, 9, -1), np.float32)
+
+
+def compile_binding(
+    template: AffineTemplate,
+    inverses: Array,
+    weights: Array32,
+    local: Array32,
+    gains: Array32,
+) -> Binding:
+    """Compile weights and local coordinates to a Jacobian.
+
+    Args:
+        inverses: ``[P, 3, 3]`` of the part frames at the bound parameters.
+        weights: ``[V, P]`` that sum to one over the parts.
+        local: ``[V, P, 3]`` where each part carries the vertex, in the part's unit frame.
+        gains: ``[V, P, 3]`` derivative of `local` along the part's axes; 1 inside, 0 far outside.
+    """
+    count, parts = weights.shape
+    coefficients = np.empty((count, parts, 4), np.float32)
+    np.multiply(local, weights[:, :, None], out=coefficients[:, :, :3])
+    coefficients[:, :, 3] = weights
+    moves = template.frame_jacobian.transpose(0, 2, 1, 3).reshape(4 * parts, -1)
+    jacobian = coefficients.reshape(count, -1) @ moves.astype(np.float32)
+    return Binding(
+        jacobian=jacobian.reshape(count, 3, -1),
+        gains=(gains * weights[:, :, None]).reshape(count, -1),
+        stretches=part_stretches(template, inverses),
+    )

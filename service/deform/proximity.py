@@ -1,0 +1,90 @@
+"""How near mesh vertices are to a template's parts, and what each part says of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.deform.binding import FLOOR
+from service.deform.groups import Group
+
+Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
+
+# How much of the distance to a part counts for a vertex between the mirrored parts of a group,
+# such as one of a stretcher between legs.
+BETWEEN = 0.5
+# Distance over which a part's hold on its surroundings fades, and how fast.
+BAND = 0.02
+POWER = 6
+# An axis counts as thin under this share of the part's longest.
+THIN = 0.4
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """The parts' bounding boxes at the bound parameters.
+
+    Attributes:
+        frames: ``[P, 3, 4]``.
+        inverses: ``[P, 3, 3]``.
+    """
+
+    frames: Array
+    inverses: Array
+
+    @property
+    def sizes(self) -> Array:
+        """``[P, 3]`` lengths of the boxes' axes, none shorter than what the inverses assume."""
+        sizes: Array = np.maximum(np.linalg.norm(self.frames[:, :, :3], axis=1), FLOOR)
+        return sizes
+
+    @property
+    def thin(self) -> NDArray[np.bool_]:
+        """``[P, 3]`` the axes across slender and flat parts."""
+        sizes = self.sizes
+        thin: NDArray[np.bool_] = sizes < THIN * sizes.max(axis=1, keepdims=True)
+        return thin
+
+    def local(self, x: Array) -> Array32:
+        """Unit coordinates ``[V, P, 3]`` of ``x [V, 3]``."""
+        maps = self.inverses.transpose(2, 0, 1).reshape(3, -1)
+        shift = np.einsum("pij,pj->pi", self.inverses, self.frames[:, :, 3]).reshape(-1)
+        u = (x @ maps - shift).astype(np.float32)
+        return u.reshape(len(x), -1, 3)
+
+
+def box_distances(u: Array32, sizes: Array) -> Array32:
+    """Distances ``[V, P]`` to the parts' boxes of points with unit coordinates ``u [V, P, 3]``."""
+    beyond = np.maximum(np.abs(u) - np.float32(0.5), 0.0) * sizes.astype(np.float32)
+    return np.sqrt(np.einsum("vpk,vpk->vp", beyond, beyond))
+
+
+def nearness(to_group: Array32, band: Array32 | float = BAND) -> Array32:
+    """``[V, G]`` smooth shares of the groups, one in sum, from the distances to them.
+
+    Inverse powers, not a Gaussian: between parts far off, such as along an arm between seat and
+    back, the shares pass over as slowly as the distances are large.
+
+    Args:
+        to_group: ``[V, G]``.
+        band: distance over which a group's hold fades, ``[V, G]`` or one for all.
+    """
+    least = to_group.min(axis=1, keepdims=True)
+    near = ((least + band) / (to_group + band)) ** POWER
+    return near / near.sum(axis=1, keepdims=True)
+
+
+def group_distance(x: Array, distances: Array32, boxes: Boxes, group: Group) -> Array32:
+    """``[V]`` distance to a group: between its members, less than to the nearest of them."""
+    members = list(group.members)
+    nearest = distances[:, members].min(axis=1)
+    if len(members) == 1:
+        return nearest
+    half = 0.5 * np.abs(boxes.frames[members, :, :3]).sum(axis=2)
+    center = boxes.frames[members, :, 3]
+    low, high = (center - half).min(axis=0), (center + half).max(axis=0)
+    hull = np.linalg.norm(np.maximum(np.maximum(low - x, x - high), 0.0), axis=1)
+    return np.minimum(nearest, hull.astype(np.float32) + np.float32(BETWEEN) * nearest)

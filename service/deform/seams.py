@@ -1,0 +1,87 @@
+"""Where parts meet flush: the strips of a part that move with the part standing on them.
+
+A leg of a template is carried by a wider seat, while the seat's own corner above it is stretched;
+the two slip past each other, and a mesh that is one piece through both would shear or fold.  Over
+the strip that a flush neighbour covers the part is carried too, and the stretch is left to the
+rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.deform.spinefit import Spine
+from service.template.affine import AffineTemplate
+
+Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
+
+# The most of a part that one strip may take.
+WIDEST = 0.4
+
+
+@dataclass(frozen=True)
+class Seams:
+    """Carried strips: ``low`` and ``high``, both ``[P, 3]``, where the stretch begins and ends."""
+
+    low: Array32
+    high: Array32
+
+    def carry(self, u: Array32) -> tuple[Array32, Array32]:
+        """Unit coordinates ``[n, P, 3]`` with the strips pressed to the sides, and the slope.
+
+        Beyond the part's box coordinates are as they were.
+        """
+        slope = 1.0 / (self.high - self.low)
+        inner = (u - self.low) * slope - np.float32(0.5)
+        beyond = u - np.clip(u, -0.5, 0.5)
+        gain = np.where((u > self.low) & (u < self.high), slope, (beyond != 0.0).astype(np.float32))
+        return np.clip(inner, -0.5, 0.5) + beyond, gain
+
+
+def flush_seams(template: AffineTemplate, frames: Array, spines: dict[int, Spine]) -> Seams:
+    """Strips for the part frames ``frames [P, 3, 4]`` of axis-aligned boxes.
+
+    A neighbour counts where its side is the part's side for all parameters.  Where the mesh's own
+    neighbour is known to stand further in, the strip reaches to its inner face.
+    """
+    affine = np.concatenate([template.frame_base[..., None], template.frame_jacobian], axis=-1)
+    low, high = np.full((len(frames), 3), -0.5), np.full((len(frames), 3), 0.5)
+    for part, axis in np.ndindex(len(frames), 3):
+        row = affine[part, axis]
+        # Only axes that the part's frame doesn't turn.
+        if not row[axis].any() or np.delete(row[:3], axis, 0).any():
+            continue
+        size = float(np.abs(frames[part, axis, axis]))
+        for other in range(len(frames)):
+            for side in (-1.0, 1.0):
+                if other == part or not _flush(row, affine[other, axis], axis, side):
+                    continue
+                width = _reach(frames[other], axis, side, spines.get(other)) / max(size, 1e-9)
+                if width <= WIDEST and side < 0:
+                    low[part, axis] = max(low[part, axis], width - 0.5)
+                if width <= WIDEST and side > 0:
+                    high[part, axis] = min(high[part, axis], 0.5 - width)
+    return Seams(low.astype(np.float32), high.astype(np.float32))
+
+
+def _flush(row: Array, beside: Array, axis: int, side: float) -> bool:
+    """Whether two parts' rows ``[4, 1 + d]`` of an axis put their faces of a side in one place."""
+    return np.allclose(
+        row[3] + side * 0.5 * np.abs(row[axis]), beside[3] + side * 0.5 * np.abs(beside[axis])
+    )
+
+
+def _reach(frame: Array, axis: int, side: float, spine: Spine | None) -> float:
+    """How far from its flush side a neighbour reaches inward."""
+    width = abs(frame[axis, axis])
+    if spine is None or axis not in spine.thin:
+        return float(width)
+    # The end nearest the origin is where it is attached.
+    end = 0 if frame[spine.run, 3] * frame[spine.run, spine.run] > 0 else -1
+    middle = spine.middle[end, :, spine.thin.index(axis)].mean()
+    inward = -side * middle * frame[axis, axis]
+    return float(width + max(inward, 0.0))

@@ -1,0 +1,73 @@
+"""Wavefront OBJ.
+
+Only the numbers of ``v`` and ``vn`` lines change; vertex colours and weights behind the
+coordinates, comments, materials, groups and texture coordinates keep their bytes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.mesh import moves
+from service.mesh.corners import NORMAL, POSITION, Corners
+from service.mesh.faults import face_out_of_range, malformed
+from service.mesh.meshfile import Linear, MeshFile, Vertices
+from service.mesh.polygons import fan
+from service.mesh.replacement import rewrite
+from service.mesh.textlines import TextLines
+from service.mesh.triples import Triples
+
+
+class ObjFile(MeshFile):
+    """An OBJ file."""
+
+    format = "obj"
+    media_type = "model/obj"
+
+    def __init__(self, data: bytes) -> None:
+        """Read `data`; InvalidMesh when that can't be."""
+        self.data = data
+        lines = TextLines("obj", data, continued=True)
+        self._positions = Triples(lines, b"v")
+        self._normals = Triples(lines, b"vn")
+        corners = Corners(lines)
+        self._corner_vertices = corners.indices(POSITION, self._positions.lines)
+        self._corner_normals = corners.indices(NORMAL, self._normals.lines)
+        count, used = len(self._positions.lines), self._corner_vertices
+        # Of every face, also those of too few corners to be a triangle.
+        wrong = used[(used < 0) | (used >= count)]
+        if count and len(wrong):
+            raise face_out_of_range(int(wrong[0]), count)
+        if self._corner_normals.max(initial=-1) >= len(self._normals.lines):
+            raise malformed("obj", "a face uses a normal that isn't there")
+        self.vertices = self._positions.values
+        self.faces = fan(self._corner_vertices, corners.counts)
+
+    @moves.tolerant
+    def write(self, vertices: Vertices, linear: Linear) -> bytes:
+        """See `MeshFile.write`."""
+        change = moves.compare(self.vertices, vertices, linear)
+        if not change.any:
+            return self.data
+        moved = self._positions.changed(change.moved, vertices)
+        turned = self._normals.changed(*self._turned_normals(change))
+        return rewrite(self.data, [moved, turned])
+
+    def _turned_normals(self, change: moves.Moves) -> tuple[NDArray[np.bool_], Vertices]:
+        """Which normals turn, ``[N]``, and all normals after, ``[N, 3]``.
+
+        A normal that several vertices use takes the mean of what their maps make of it.
+        """
+        values = self._normals.values
+        turned = np.zeros(len(values), bool)
+        used = self._corner_normals >= 0
+        vertex, normal = self._corner_vertices[used], self._corner_normals[used]
+        turned[normal[change.turned[vertex]]] = True
+        affected = turned[normal]
+        pairs = np.unique(normal[affected] * len(self.vertices) + vertex[affected])
+        normal, vertex = np.divmod(pairs, len(self.vertices))
+        mapped = moves.turn_normals(values[normal], change.linear[vertex])
+        sums = [np.bincount(normal, mapped[:, i], len(turned)) for i in range(3)]
+        total: Vertices = np.stack(sums, axis=1).astype(np.float64)
+        return turned, moves.unit(total, values)

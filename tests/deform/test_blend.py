@@ -1,0 +1,173 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from boxes import ORIGIN, PARAMETERS, block, chair, change, joined, template_mesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from model_export.detailed import detailed_chair
+from service.deform.binding import Binding
+from service.deform.blend import bind
+from service.deform.flips import count_flips
+
+
+def bound(mesh: tuple[np.ndarray, np.ndarray]) -> Binding:
+    return bind(*mesh, chair(), PARAMETERS, ORIGIN)
+
+
+def detailed(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
+    """A detailed chair's normalised vertices, faces, parameters, origin, and the scale."""
+    it = detailed_chair(seed)
+    x = it.mesh(it.parameters)
+    center = x.mean(axis=0)
+    scale = 0.6 / np.linalg.norm(x - center, axis=1).max()
+    return (x - center) * scale, it.faces, it.parameters * scale, -center * scale, scale
+
+
+def test_the_template_moves_as_it_decodes_itself():
+    template = chair()
+    vertices, faces = template_mesh()
+    df = 0.2 * PARAMETERS * np.array([1, -1, 1, -1, 1, -1, 1, -1])
+    moved = vertices + bound((vertices, faces)).displace(df)
+    np.testing.assert_allclose(moved, template.decode(PARAMETERS + df) + ORIGIN, atol=1e-6)
+
+
+def test_displacements_add_up_and_are_the_jacobian_times_the_change():
+    binding = bound(template_mesh())
+    a, b = change("seat_width", 0.1), change("leg_height", -0.07)
+    np.testing.assert_allclose(
+        binding.displace(a + b), binding.displace(a) + binding.displace(b), atol=1e-7
+    )
+    np.testing.assert_array_equal(
+        binding.displace(change("seat_width", 1.0)), binding.jacobian[:, :, 4]
+    )
+
+
+def test_no_change_moves_nothing():
+    assert not bound(template_mesh()).displace(np.zeros(8)).any()
+
+
+@pytest.mark.parametrize(
+    ("name", "still"),
+    [
+        ("seat_width", [1, 2]), ("seat_depth", [0, 1]), ("leg_height", [0, 2]),
+        ("back_height", [0, 2]), ("back_thickness", [0, 1]), ("seat_thickness", [0, 2]),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("seed", [1, 2])
+def test_an_edit_moves_nothing_along_other_axes_bit_for_bit(seed, name, still):
+    x, faces, f, t, _ = detailed(seed)
+    moved = bind(x, faces, chair(), f, t).displace(change(name, 0.13))
+    assert not moved[:, still].any()
+    assert moved.any()
+
+
+def test_parts_that_an_edit_leaves_alone_stay_within_the_aim():
+    x, faces, f, t, _ = detailed(4)
+    still = x[:, 1] - t[1] > f[2] / 2 + 0.01
+    moved = bind(x, faces, chair(), f, t).displace(change("leg_height", 0.4 * f[5]))
+    assert np.linalg.norm(moved[still], axis=1).mean() < 5e-4 * np.linalg.norm(np.ptp(x, axis=0))
+
+
+@pytest.mark.parametrize("seed", [0, 2, 7])
+def test_detailed_chairs_follow_their_truth(seed):
+    x, faces, f, t, scale = detailed(seed)
+    it = detailed_chair(seed)
+    binding = bind(x, faces, chair(), f, t)
+    for name in ("seat_width", "seat_depth", "leg_height", "back_height", "leg_width"):
+        df = change(name, 0.4) * f
+        truth = it.mesh(it.parameters + df / scale) * scale + t
+        error = np.linalg.norm(x + binding.displace(df) - truth, axis=1).mean()
+        assert error < 0.15 * np.linalg.norm(truth - x, axis=1).mean(), name
+
+
+@pytest.mark.parametrize("factor", [-0.3, 0.4])
+def test_no_face_turns_inside_out(factor):
+    x, faces, f, t, _ = detailed(2)
+    binding = bind(x, faces, chair(), f, t)
+    for name in chair().names:
+        df = change(name, factor) * f
+        assert count_flips(x, x + binding.displace(df), faces, binding.linear(df)) == 0, name
+
+
+def test_vertices_at_one_place_move_together():
+    vertices, faces = template_mesh()
+    seam = vertices[faces].reshape(-1, 3)
+    soup = np.arange(len(seam)).reshape(-1, 3)
+    moved = bound((seam, soup)).displace(0.3 * PARAMETERS)
+    np.testing.assert_array_equal(
+        moved, bound((vertices, faces)).displace(0.3 * PARAMETERS)[faces.ravel()]
+    )
+
+
+def test_a_mirrored_mesh_moves_as_the_mirror_image():
+    mirror = np.array([-1.0, 1.0, 1.0])
+    x, faces, f, t, _ = detailed(2)
+    moved = bind(x, faces, chair(), f, t).displace(0.3 * f)
+    image = bind(x * mirror, faces[:, ::-1], chair(), f, t * mirror).displace(0.3 * f)
+    assert np.abs(image * mirror - moved).max() < 1e-4
+
+
+def test_a_small_piece_on_the_back_is_carried_without_stretch():
+    w, d, bt = PARAMETERS[[4, 3, 1]]
+    back = block((-w / 2, 0.025, -d / 2), (w / 2, 0.525, bt - d / 2))
+    knob = block((-0.02, 0.4, bt - d / 2), (0.02, 0.44, bt - d / 2 + 0.04), cells=1)
+    moved = bound(joined(back, knob)).displace(
+        change("back_height", 0.2) + change("seat_width", 0.1)
+    )
+    own = moved[len(back[0]) :]
+    np.testing.assert_allclose(own, np.broadcast_to(own[0], own.shape), atol=1e-6)
+    assert 0.1 < own[0, 1] < 0.2
+
+
+def test_a_splayed_leg_thickens_about_its_own_axis():
+    vertices, faces = template_mesh()
+    template = chair()
+    legs = np.isin(template.part, [2, 3, 4, 5])
+    down = np.where(legs, np.clip(-0.025 - (vertices - ORIGIN)[:, 1], 0.0, None), 0.0) / 0.4
+    vertices[:, 0] += 0.1 * down * np.sign(vertices[:, 0] - ORIGIN[0])
+    moved = bound((vertices, faces)).displace(change("leg_width", 0.02))
+    straight = bound(template_mesh()).displace(change("leg_width", 0.02))
+    np.testing.assert_allclose(moved[legs], straight[legs], atol=1e-3)
+
+
+def test_a_stretcher_lengthens_evenly_from_leg_to_leg():
+    w, d = PARAMETERS[[4, 3]]
+    legs, _ = template_mesh()
+    rail = block((-w / 2 + 0.05, -0.3, d / 2 - 0.03), (w / 2 - 0.05, -0.28, d / 2 - 0.01), cells=10)
+    moved = bound(joined((legs, chair().faces), rail)).displace(change("seat_width", 0.1))[
+        len(legs) :
+    ]
+    inner = w - 0.1
+    expected = (rail[0][:, 0] - ORIGIN[0]) / inner * 0.1
+    np.testing.assert_allclose(moved[:, 0], expected, atol=1e-6)
+
+
+def test_beyond_a_thin_part_growth_is_bounded():
+    thin = PARAMETERS.copy()
+    thin[2] = 0.01
+    w, d = PARAMETERS[[4, 3]]
+    cushion = block((-w / 2, -0.005, -d / 2), (w / 2, 0.15, d / 2))
+    moved = bind(*cushion, chair(), thin, ORIGIN).displace(change("seat_thickness", 0.04))
+    assert np.abs(moved).max() <= 0.04 + 1e-6
+
+
+def test_points_without_faces_and_a_part_without_size_are_bound():
+    flat = PARAMETERS * np.array([1, 0, 0, 1, 1, 1, 0, 0])
+    points = template_mesh()[0]
+    moved = bind(points, np.empty((0, 3), np.int64), chair(), flat, ORIGIN).displace(
+        0.2 * PARAMETERS
+    )
+    assert np.isfinite(moved).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(hnp.arrays(np.float64, (12, 3), elements=st.floats(-0.7, 0.7)), st.randoms())
+def test_any_triangles_are_bound_to_finite_moves(points, random):
+    faces = np.array([[random.randrange(12) for _ in range(3)] for _ in range(9)])
+    binding = bound((points, faces))
+    assert np.isfinite(binding.jacobian).all()
+    assert np.isfinite(binding.linear(0.4 * PARAMETERS)).all()
+    assert np.abs(binding.displace(0.4 * PARAMETERS)).max() < 2.0

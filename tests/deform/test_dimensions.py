@@ -1,0 +1,224 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from service.deform.dimensions import Dimensions
+from service.edits import Change, Kind
+from service.errors import InvalidRequest
+from service.template.loader import load_template
+
+CHAIR = load_template("chair")
+VALUES = {
+    "back_height": 0.40,
+    "back_thickness": 0.04,
+    "seat_thickness": 0.06,
+    "seat_depth": 0.45,
+    "seat_width": 0.48,
+    "leg_height": 0.36,
+    "leg_depth": 0.05,
+    "leg_width": 0.05,
+}
+F = np.array([VALUES[name] for name in CHAIR.names])
+
+
+def box_chair() -> Dimensions:
+    """The template itself as the bound mesh: it moves exactly as its parameters say."""
+    return Dimensions(CHAIR, F, CHAIR.decode(F), CHAIR.jacobian)
+
+
+def with_wings() -> Dimensions:
+    """A chair with a headrest 10 cm above its back, and wings that stick out by 5 cm each.
+
+    They move with the outermost vertices.
+    """
+    vertices, jacobian = CHAIR.decode(F), CHAIR.jacobian
+    top = vertices[:, 1].argmax()
+    left, right = vertices[:, 0].argmax(), vertices[:, 0].argmin()
+    extra = vertices[[top, left, right]] + [[0, 0.1, 0], [0.05, 0, 0], [-0.05, 0, 0]]
+    return Dimensions(
+        CHAIR,
+        F,
+        np.concatenate([vertices, extra]),
+        np.concatenate([jacobian, jacobian[[top, left, right]]]).astype(np.float32),
+    )
+
+
+def named(values: np.ndarray) -> dict[str, float]:
+    return dict(zip(CHAIR.names, values.tolist(), strict=True))
+
+
+def after(dimensions: Dimensions, **changes: tuple[Kind, float]) -> dict[str, float]:
+    return named(dimensions.after({name: Change(*change) for name, change in changes.items()}))
+
+
+@pytest.mark.parametrize("name", CHAIR.names)
+def test_a_parameter_changes_alone(name: str) -> None:
+    value = VALUES[name]
+    changes: list[tuple[Kind, float, float]] = [
+        ("set", 0.3, 0.3),
+        ("add", 0.02, value + 0.02),
+        ("scale", 1.5, 1.5 * value),
+    ]
+    for kind, amount, expected in changes:
+        assert after(box_chair(), **{name: (kind, amount)}) == VALUES | {name: expected}
+
+
+def test_no_change_leaves_every_bit() -> None:
+    dimensions = with_wings()
+    assert np.array_equal(dimensions.after({}), F)
+    derived = dimensions.derived(F)
+    same = {name: Change("set", value) for name, value in derived.items()}
+    np.testing.assert_array_equal(dimensions.after(same), F)
+
+
+def test_derived_dimensions_are_read_from_the_parameters_and_the_mesh() -> None:
+    derived = box_chair().derived(F)
+    assert derived == pytest.approx(
+        {"seat_top_height": 0.42, "total_height": 0.82, "total_width": 0.48, "total_depth": 0.45}
+    )
+    derived = with_wings().derived(F)
+    assert derived["total_height"] == pytest.approx(0.92)
+    assert derived["total_width"] == pytest.approx(0.58)
+    taller = F.copy()
+    taller[CHAIR.names.index("back_height")] += 0.2
+    assert with_wings().derived(taller)["total_height"] == pytest.approx(1.12)
+
+
+def test_the_seats_height_is_reached_by_the_legs() -> None:
+    values = after(box_chair(), seat_top_height=("set", 0.5))
+    assert values == pytest.approx(VALUES | {"leg_height": 0.44})
+
+
+def test_the_total_height_is_shared_in_proportion() -> None:
+    values = after(box_chair(), total_height=("add", 0.19))
+    growth = 1 + 0.19 / (0.40 + 0.36)
+    assert values == pytest.approx(
+        VALUES | {"leg_height": 0.36 * growth, "back_height": 0.40 * growth}
+    )
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    st.sampled_from(["seat_top_height", "total_height", "total_width", "total_depth"]),
+    st.floats(0.6, 1.8),
+)
+def test_extents_are_exact_on_the_mesh_itself(name: str, factor: float) -> None:
+    dimensions = with_wings()
+    target = dimensions.derived(F)[name] * factor
+    values = dimensions.after({name: Change("scale", factor)})
+    moved = dimensions.vertices + dimensions.jacobian @ (values - F)
+    measured = {
+        "seat_top_height": values[CHAIR.names.index("leg_height")] + 0.06,
+        "total_height": np.ptp(moved[:, 1]),
+        "total_width": np.ptp(moved[:, 0]),
+        "total_depth": np.ptp(moved[:, 2]),
+    }
+    assert measured[name] == pytest.approx(target, rel=1e-6)
+
+
+def test_an_extent_whose_outermost_vertex_changes_is_still_exact() -> None:
+    # A rigid ornament is outermost until the seat has grown past it.
+    vertices = np.concatenate([CHAIR.decode(F), [[0.30, 0, 0], [-0.30, 0, 0]]])
+    jacobian = np.concatenate([CHAIR.jacobian, np.zeros((2, 3, 8))])
+    jacobian[-2, 0, CHAIR.names.index("seat_width")] = 0.1
+    dimensions = Dimensions(CHAIR, F, vertices, jacobian)
+    values = dimensions.after({"total_width": Change("set", 0.9)})
+    moved = vertices + jacobian @ (values - F)
+    assert np.ptp(moved[:, 0]) == pytest.approx(0.9, rel=1e-6)
+
+
+def test_parameters_that_are_named_are_not_moved_by_dimensions() -> None:
+    values = after(box_chair(), total_height=("set", 1.0), leg_height=("set", 0.40))
+    assert values == pytest.approx(VALUES | {"leg_height": 0.40, "back_height": 0.54})
+    values = after(box_chair(), total_height=("set", 1.0), seat_top_height=("set", 0.5))
+    assert values == pytest.approx(VALUES | {"leg_height": 0.44, "back_height": 0.50})
+
+
+def test_the_order_of_the_changes_makes_no_difference() -> None:
+    changes = {
+        "total_height": Change("set", 1.0),
+        "seat_top_height": Change("scale", 1.1),
+        "seat_thickness": Change("add", 0.02),
+    }
+    forward = box_chair().after(changes)
+    backward = box_chair().after(dict(reversed(changes.items())))
+    np.testing.assert_array_equal(forward, backward)
+    assert named(forward)["leg_height"] == pytest.approx(1.1 * 0.42 - 0.08)
+
+
+def test_derived_changes_start_from_the_values_before_the_edit() -> None:
+    values = after(box_chair(), seat_thickness=("set", 0.10), seat_top_height=("add", 0.05))
+    assert values["leg_height"] + values["seat_thickness"] == pytest.approx(0.42 + 0.05)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"total_height": 1.0, "leg_height": 0.4, "back_height": 0.4},
+        {"seat_top_height": 0.5, "leg_height": 0.4},
+        {"total_width": 0.5, "seat_width": 0.6},
+        {"total_depth": 0.5, "seat_depth": 0.6},
+    ],
+)
+def test_a_dimension_with_nothing_left_to_move_is_refused(changes: dict[str, float]) -> None:
+    with pytest.raises(InvalidRequest) as caught:
+        box_chair().after({name: Change("set", value) for name, value in changes.items()})
+    assert caught.value.code == "dimension_fixed"
+    assert next(iter(changes)) in caught.value.detail
+
+
+def test_changes_that_agree_with_each_other_are_not_refused() -> None:
+    values = after(box_chair(), seat_width=("set", 0.6), total_width=("set", 0.6))
+    assert values == pytest.approx(VALUES | {"seat_width": 0.6})
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "culprit"),
+    [
+        ("seat_width", ("set", 0.0), "seat_width"),
+        ("seat_width", ("set", -1.0), "seat_width"),
+        ("leg_height", ("add", -0.36), "leg_height"),
+        ("leg_height", ("scale", 0.0), "leg_height"),
+        ("back_height", ("scale", -2.0), "back_height"),
+        ("seat_top_height", ("set", 0.05), "leg_height"),
+        ("total_height", ("set", 0.05), "back_height"),
+        ("total_width", ("set", 0.0), "seat_width"),
+        ("total_depth", ("scale", -1.0), "seat_depth"),
+    ],
+)
+def test_sizes_that_would_not_be_positive_are_refused(
+    name: str, change: tuple[Kind, float], culprit: str
+) -> None:
+    with pytest.raises(InvalidRequest) as caught:
+        after(box_chair(), **{name: change})
+    assert caught.value.code == "size_not_positive"
+    assert caught.value.detail.startswith(f"{culprit} would be ")
+    assert name in caught.value.detail
+
+
+def test_an_unknown_name_is_refused_and_the_known_ones_listed() -> None:
+    with pytest.raises(InvalidRequest) as caught:
+        after(box_chair(), seat_height=("set", 1.0))
+    assert caught.value.code == "unknown_parameter"
+    assert "'seat_height'" in caught.value.detail
+    for name in (*CHAIR.names, *CHAIR.derived):
+        assert name in caught.value.suggestion
+
+
+def test_the_mesh_is_left_as_it_was() -> None:
+    dimensions = box_chair()
+    parameters, vertices = dimensions.parameters.copy(), dimensions.vertices.copy()
+    dimensions.after({"total_height": Change("set", 1.2), "seat_width": Change("scale", 2)})
+    assert np.array_equal(dimensions.parameters, parameters)
+    assert np.array_equal(dimensions.vertices, vertices)
+
+
+def test_dimensions_by_extent_only_need_no_row() -> None:
+    derived = {n: replace(d, row=None, extent="y") for n, d in CHAIR.derived.items()}
+    dimensions = Dimensions(replace(CHAIR, derived=derived), F, CHAIR.decode(F), CHAIR.jacobian)
+    np.testing.assert_allclose(list(dimensions.derived(F).values()), 0.82)

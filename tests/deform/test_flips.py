@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from service.deform.flips import count_flips
+
+SPHERE = trimesh.creation.icosphere(subdivisions=2)
+VERTICES = np.asarray(SPHERE.vertices, np.float64)
+FACES = np.asarray(SPHERE.faces, np.int64)
+
+
+def flips(after: np.ndarray, linear: np.ndarray, faces: np.ndarray = FACES) -> int:
+    """Flips when every vertex has the same linear map ``[3, 3]``."""
+    return count_flips(VERTICES, after, faces, np.broadcast_to(linear, (len(VERTICES), 3, 3)))
+
+
+@pytest.mark.parametrize(
+    "linear",
+    [
+        np.eye(3),
+        np.diag([3.0, 0.2, 1.0]),
+        np.diag([1.0, 1.0, 1e-3]),
+        [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
+        [[1, 4, 0], [0, 1, 0], [0, 0, 1]],
+        -np.diag([1.0, 1.0, -1.0]),
+    ],
+)
+def test_a_linear_map_that_keeps_handedness_flips_nothing(linear: np.ndarray) -> None:
+    linear = np.asarray(linear, np.float64)
+    assert flips(VERTICES @ linear.T + [1, 2, 3], linear) == 0
+
+
+def test_a_face_that_turns_against_its_map_is_a_flip() -> None:
+    after = VERTICES.copy()
+    corners = FACES[17]
+    # Swapping two corners of one face turns it over; its neighbours keep their sides or lose area.
+    lonely = FACES[[17]]
+    after[corners[[0, 1]]] = after[corners[[1, 0]]]
+    assert flips(after, np.eye(3), lonely) == 1
+    assert flips(VERTICES, np.eye(3), lonely) == 0
+
+
+def test_faces_that_a_mirror_turns_by_more_than_a_right_angle_are_counted() -> None:
+    mirror = np.diag([1.0, 1.0, -1.0])
+    normals = np.cross(*np.moveaxis(np.diff(VERTICES[FACES], axis=1), 1, 0))
+    turned = (normals @ np.diag([-1.0, -1.0, 1.0]) * normals).sum(axis=1) < 0
+    assert flips(VERTICES @ mirror, np.eye(3)) == turned.sum() > 0
+
+
+def test_a_turned_face_whose_map_turned_with_it_is_none() -> None:
+    half_turn = np.diag([-1.0, 1.0, -1.0])
+    assert flips(VERTICES @ half_turn, half_turn) == 0
+    assert flips(VERTICES @ half_turn, np.eye(3)) > 0
+
+
+def test_area_vectors_are_carried_by_the_cofactors() -> None:
+    # Steep shear: a normal carried by the map itself would end up on the wrong side.
+    linear = np.array([[1.0, 0, 0], [-5.0, 1, 0], [0, 0, 1]])
+    before = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, -1]])
+    maps = np.broadcast_to(linear, (3, 3, 3))
+    assert count_flips(before, before @ linear.T, np.array([[0, 1, 2]]), maps) == 0
+    wrong = (before @ linear.T)[[0, 2, 1]]
+    assert count_flips(before, wrong, np.array([[0, 1, 2]]), maps) == 1
+
+
+def test_a_map_that_flattens_is_no_fault() -> None:
+    flat = np.diag([1.0, 0.0, 1.0])
+    assert flips(VERTICES @ flat, flat) == 0
+
+
+def test_faces_too_small_to_have_a_side_are_left_out() -> None:
+    sliver = VERTICES[0] + np.array([[0, 0, 0], [1e-5, 0, 0], [0, 1e-5, 0]])
+    before = np.concatenate([VERTICES, sliver])
+    after = np.concatenate([VERTICES, sliver[[0, 2, 1]]])
+    faces = np.concatenate([FACES, len(VERTICES) + np.array([[0, 1, 2]])])
+    maps = np.broadcast_to(np.eye(3), (len(before), 3, 3))
+    assert count_flips(before, after, faces, maps) == 0
+    assert count_flips(100 * before, 100 * after, faces, maps) == 0

@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import numpy as np
+from boxes import ORIGIN, PARAMETERS, block, chair, joined, template_mesh
+
+from service.deform.binding import inverse_frames
+from service.deform.groups import hub_parts, mirror_groups
+from service.deform.pieces import Votes, touching_pieces, vote
+from service.deform.proximity import Boxes, box_distances, group_distance
+from service.deform.weld import Welded, weld
+
+W, D = PARAMETERS[[4, 3]]
+
+
+def votes(*meshes: tuple[np.ndarray, np.ndarray]) -> tuple[Welded, Votes]:
+    template = chair()
+    welded = weld(*joined(*meshes))
+    frames = template.frames(PARAMETERS)
+    boxes = Boxes(frames, inverse_frames(frames))
+    x = welded.vertices - ORIGIN
+    u = boxes.local(x)
+    groups = mirror_groups(template)
+    distances = box_distances(u, boxes.sizes)
+    to_group = np.stack([group_distance(x, distances, boxes, g) for g in groups], axis=1)
+    touching = touching_pieces(*welded.boxes())
+    hubs = hub_parts(template)
+    return welded, vote(u, distances, to_group, welded.piece, touching, groups, boxes, hubs)
+
+
+def test_each_box_of_the_template_goes_with_its_part():
+    welded, result = votes(template_mesh())
+    assert result.whole.all()
+    part = chair().part
+    for piece in range(welded.pieces):
+        own = np.unique(part[np.isin(welded.of, np.flatnonzero(welded.piece == piece))])
+        assert result.shares[piece].tolist() == np.eye(3)[min(own[0], 2)].tolist()
+        np.testing.assert_array_equal(result.keep[piece, own[0]], 1.0)
+
+
+def test_a_timber_from_floor_to_top_is_left_to_its_vertices():
+    post = block((-W / 2, -0.42, -D / 2), (-W / 2 + 0.05, 0.5, -D / 2 + 0.04))
+    _, result = votes(post)
+    assert not result.whole.any()
+    np.testing.assert_array_equal(result.keep, 1.0)
+
+
+def test_a_rail_goes_with_the_legs_and_a_cushion_with_the_seat():
+    rail = block((-W / 2 + 0.02, -0.3, D / 2 - 0.03), (W / 2 - 0.02, -0.28, D / 2 - 0.01))
+    cushion = block((-0.18, 0.026, -0.15), (0.18, 0.09, 0.2))
+    welded, result = votes(rail, cushion)
+    lowest = welded.boxes()[0][:, 1].argmin()
+    assert result.shares[lowest].tolist() == [0, 0, 1]
+    assert result.shares[1 - lowest].tolist() == [1, 0, 0]
+    # The cushion lies on the seat: it is lifted with the top, not thickened.
+    assert result.keep[1 - lowest, 0].tolist() == [1, 0, 1]
+    assert result.anchor[1 - lowest, 0, 1] == 0.5
+
+
+def test_a_spindle_is_stretched_along_itself_and_a_slat_is_carried_up():
+    z = PARAMETERS[1] / 2 - D / 2
+    spindle = block((-0.01, 0.3, z - 0.01), (0.01, 0.42, z + 0.01))
+    slat = block((-W / 2, 0.1, z - 0.01), (W / 2, 0.15, z + 0.01))
+    welded, result = votes(spindle, slat)
+    upper = welded.boxes()[0][:, 1].argmax()
+    assert result.keep[upper, 1, :2].tolist() == [0, 1]
+    assert result.keep[1 - upper, 1, :2].tolist() == [1, 0]
+
+
+def test_touching_pieces_are_carried_together():
+    spoke = block((-0.2, -0.40, -0.02), (0.2, -0.36, 0.02))
+    castor = block((-0.21, -0.43, -0.01), (-0.16, -0.39, 0.01))
+    _, apart = votes(block((-0.2, -0.30, -0.02), (0.2, -0.26, 0.02)), castor)
+    _, result = votes(spoke, castor)
+    np.testing.assert_array_equal(result.anchor[0, 2, 1], result.anchor[1, 2, 1])
+    assert apart.anchor[0, 2, 1] != apart.anchor[1, 2, 1]
+
+
+def test_boxes_touch_across_a_hair_and_not_across_a_hand():
+    low = np.array([[0.0, 0, 0], [0.101, 0, 0], [0.3, 0, 0]])
+    touching = touching_pieces(low, low + 0.1)
+    assert touching.tolist() == [[True, True, False], [True, True, False], [False, False, True]]

@@ -1,0 +1,27 @@
+from __future__ import annotations
+
+import numpy as np
+from boxes import PARAMETERS, chair
+
+from service.deform.seams import flush_seams
+
+
+def test_strips_over_legs_and_back_are_carried_and_the_rest_stretches():
+    template = chair()
+    seams = flush_seams(template, template.frames(PARAMETERS), {})
+    w, d, lw, ld = PARAMETERS[[4, 3, 7, 6]]
+    np.testing.assert_allclose(seams.high[0], [0.5 - lw / w, 0.5, 0.5 - ld / d], atol=1e-6)
+    # Behind, the legs and the back are both flush; the deeper one counts.
+    np.testing.assert_allclose(seams.low[0, 2], 0.04 / d - 0.5, atol=1e-6)
+    assert seams.low[2].tolist() == [-0.5, -0.5, -0.5]
+
+
+def test_the_seat_then_moves_with_the_leg_below_it():
+    template = chair()
+    seams = flush_seams(template, template.frames(PARAMETERS), {})
+    lw, w = PARAMETERS[[7, 4]]
+    u = np.zeros((4, 6, 3), np.float32)
+    u[:, 0, 0] = [0.0, 0.5 - lw / w, 0.5, 0.7]
+    carried, gain = seams.carry(u)
+    np.testing.assert_allclose(carried[:, 0, 0], [0.0, 0.5, 0.5, 0.7], atol=1e-6)
+    np.testing.assert_allclose(gain[[0, 3], 0, 0], [0.5 / (0.5 - lw / w), 1.0], atol=1e-6)

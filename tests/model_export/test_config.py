@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from model_export.config import Config, load_config
+from model_export.losses import Weights
+from model_export.synthetic import Augmentation
+
+
+def test_the_defaults_are_the_papers() -> None:
+    config = load_config("paper-chair")
+    assert config == Config()
+    assert config.template == "chair"
+    assert (config.batch, config.real_share, config.learning_rate) == (16, 0.5, 1e-3)
+    assert (config.weights.alpha, config.weights.beta, config.weights.gamma) == (0.3, 30.0, 50.0)
+    assert (config.shared, config.head) == ((64, 128, 128, 256), None)
+    assert config.editing
+    assert not config.cosine
+
+
+def test_the_shipped_chair_has_a_configuration() -> None:
+    config = load_config("chair")
+    assert config.template == "chair"
+    assert config.final_points == 2840
+    assert config.weights == Weights()
+    low, high = config.points
+    assert 0 < low <= high
+
+
+def test_a_file_overrides_the_defaults_and_the_caller_overrides_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "steps: 7\nseed: 3\npoints: [10, 20]\nhead: [8]\nshared: [4, 5]\n"
+        "weights: {gamma: 0}\naugmentation: {clutter: 0.2}\n",
+        "utf-8",
+    )
+    config = load_config(str(path), seed=0, steps=None, batch=2)
+    assert (config.steps, config.seed, config.batch) == (7, 0, 2)
+    assert (config.points, config.head, config.shared) == ((10, 20), (8,), (4, 5))
+    assert config.weights == Weights(alpha=0.3, beta=30.0, gamma=0)
+    assert config.augmentation == Augmentation(clutter=0.2)
+
+
+def test_an_empty_file_is_all_defaults(tmp_path: Path) -> None:
+    path = tmp_path / "empty.yml"
+    path.write_text("# nothing\n", "utf-8")
+    assert load_config(str(path)) == Config()
+
+
+def test_a_setting_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("stepps: 7\n", "utf-8")
+    with pytest.raises(ValueError, match="no setting is named 'stepps'"):
+        load_config(str(path))
+    with pytest.raises(ValueError, match="no setting is named 'rate'"):
+        load_config("chair", rate=1.0)
+
+
+def test_a_configuration_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(ValueError, match="no configuration named 'sofa'"):
+        load_config("sofa")

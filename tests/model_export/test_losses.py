@@ -1,0 +1,189 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from model_export.losses import Losses, Weights, draw_edit, total
+from model_export.synthetic import Batch
+from service.template.affine import AffineTemplate
+
+
+@pytest.fixture(scope="module")
+def losses(chair: AffineTemplate) -> Losses:
+    return Losses(chair, torch.linspace(0.05, 0.3, 11))
+
+
+@pytest.fixture(scope="module")
+def labels(chair: AffineTemplate) -> Tensor:
+    """``[4, 11]`` parameters and translations."""
+    rng = np.random.default_rng(0)
+    f, t = rng.uniform(chair.low, chair.high, (4, 8)), rng.normal(0, 0.1, (4, 3))
+    return torch.tensor(np.hstack([f, t]), dtype=torch.float32)
+
+
+@pytest.fixture(scope="module")
+def predicted(labels: Tensor) -> Tensor:
+    return labels + 0.05 * torch.randn(4, 11, generator=torch.Generator().manual_seed(1))
+
+
+def as_batch(labels: Tensor) -> Batch:
+    return Batch(torch.zeros(4, 1, 3), labels[:, :8], labels[:, 8:])
+
+
+def test_torch_and_numpy_decode_alike(
+    chair: AffineTemplate, losses: Losses, labels: Tensor
+) -> None:
+    decoded = losses.decode(labels).numpy()
+    f, t = labels[:, :8].double().numpy(), labels[:, 8:].double().numpy()
+    np.testing.assert_allclose(decoded, chair.decode(f) + t[:, None], atol=1e-6)
+
+
+def test_the_semantic_loss_is_the_mean_square_in_deviations(
+    losses: Losses, labels: Tensor, predicted: Tensor
+) -> None:
+    spread = np.linspace(0.05, 0.3, 11)
+    squares = [
+        ((float(predicted[i, j]) - float(labels[i, j])) / spread[j]) ** 2
+        for i in range(4)
+        for j in range(11)
+    ]
+    assert losses.semantic(predicted, labels).item() == pytest.approx(np.mean(squares), rel=1e-5)
+    assert losses.semantic(labels, labels).item() == 0.0
+
+
+def test_the_reconstruction_loss_is_the_mean_squared_vertex_distance(
+    chair: AffineTemplate, losses: Losses, labels: Tensor, predicted: Tensor
+) -> None:
+    distances = []
+    for p, t in zip(predicted.double().numpy(), labels.double().numpy(), strict=True):
+        gap = chair.decode(p[:8]) + p[8:] - chair.decode(t[:8]) - t[8:]
+        distances += [float(row @ row) for row in gap]
+    assert losses.reconstruction(predicted, labels).item() == pytest.approx(
+        np.mean(distances), rel=1e-4
+    )
+
+
+def test_a_shared_addition_changes_neither_loss(
+    losses: Losses, labels: Tensor, predicted: Tensor
+) -> None:
+    # Why the editing branch multiplies: an additive edit would train nothing new.
+    added = torch.linspace(-0.2, 0.4, 11)
+    for loss in (losses.semantic, losses.reconstruction):
+        plain = loss(predicted, labels).item()
+        assert loss(predicted + added, labels + added).item() == pytest.approx(plain, rel=1e-3)
+        doubled = loss(predicted * 2, labels * 2).item()
+        assert doubled == pytest.approx(4 * plain, rel=1e-4)
+
+
+def test_an_edit_multiplies_the_parameters_and_keeps_the_place(
+    losses: Losses, labels: Tensor
+) -> None:
+    factors = torch.linspace(0.6, 1.6, 32).reshape(4, 8)
+    edited = losses.edit(labels, factors)
+    assert torch.equal(edited[:, :8], labels[:, :8] * factors)
+    assert torch.equal(edited[:, 8:], labels[:, 8:])
+
+
+def test_the_editing_branch_edits_prediction_and_truth_alike(
+    losses: Losses, labels: Tensor, predicted: Tensor
+) -> None:
+    factors = draw_edit(4, 8, torch.Generator().manual_seed(2), "cpu")
+    terms = losses.synthetic(predicted, as_batch(labels), factors)
+    assert set(terms) == {"sem", "rec", "sem_edit", "rec_edit"}
+    edited, target = predicted.clone(), labels.clone()
+    edited[:, :8] *= factors
+    target[:, :8] *= factors
+    assert torch.equal(terms["sem"], losses.semantic(predicted, labels))
+    assert torch.equal(terms["rec"], losses.reconstruction(predicted, labels))
+    assert torch.allclose(terms["sem_edit"], losses.semantic(edited, target))
+    assert torch.allclose(terms["rec_edit"], losses.reconstruction(edited, target))
+    assert set(losses.synthetic(predicted, as_batch(labels), None)) == {"sem", "rec"}
+
+
+def test_edits_are_log_uniform_factors_on_a_random_subset() -> None:
+    factors = draw_edit(4000, 8, torch.Generator().manual_seed(3), "cpu")
+    assert factors.shape == (4000, 8)
+    assert 0.599 < factors.min() < 0.605
+    assert 1.66 < factors.max() <= 1.67
+    edited = factors != 1.0
+    assert edited.any(dim=1).all()
+    # One for sure, the other seven by the toss of a coin, in each column alike.
+    assert edited.double().sum(dim=1).mean().item() == pytest.approx(1 + 7 / 2, abs=0.1)
+    np.testing.assert_allclose(edited.double().mean(dim=0), 4.5 / 8, atol=0.04)
+    log = torch.log(factors[edited])
+    np.testing.assert_allclose(
+        np.quantile(log, [0.25, 0.5, 0.75]), [-0.256, 0, 0.256], atol=0.02
+    )
+
+
+def test_edits_repeat_with_the_seed() -> None:
+    first, again, other = (
+        draw_edit(5, 8, torch.Generator().manual_seed(seed), "cpu") for seed in (1, 1, 2)
+    )
+    assert torch.equal(first, again)
+    assert not torch.equal(first, other)
+
+
+def test_the_similarity_loss_is_the_two_way_squared_chamfer(
+    losses: Losses, labels: Tensor
+) -> None:
+    clouds = 0.5 * torch.randn(4, 60, 3, generator=torch.Generator().manual_seed(4))
+    torch.manual_seed(5)
+    samples = losses._sample(losses.decode(labels), 40).double().numpy()
+    torch.manual_seed(5)
+    value = losses.similarity(labels, clouds, points=40).item()
+    there, back = [], []
+    for a, b in zip(samples, clouds[:, :40].double().numpy(), strict=True):
+        squared = np.square(a[:, None] - b[None]).sum(axis=2)
+        there.append(squared.min(axis=1).mean())
+        back.append(squared.min(axis=0).mean())
+    assert value == pytest.approx(np.mean(there) + np.mean(back), rel=1e-4)
+
+
+def test_template_samples_lie_on_its_visible_faces_by_area(
+    chair: AffineTemplate, losses: Losses
+) -> None:
+    f = torch.tensor([[0.4, 0.04, 0.06, 0.45, 0.48, 0.4, 0.16, 0.16, 0.1, 0.2, 0.3]])
+    torch.manual_seed(6)
+    vertices = losses.decode(f)
+    samples = losses._sample(vertices, 20_000)[0].double().numpy()
+    low, high = vertices[0].numpy().min(axis=0), vertices[0].numpy().max(axis=0)
+    assert (samples >= low - 1e-6).all()
+    assert (samples <= high + 1e-6).all()
+    # Each leg's four sides, without its hidden top: their share of the visible area.
+    areas = chair.face_areas(chair.decode(f[0, :8].double().numpy()))
+    visible = np.where(chair.hidden, 0.0, areas)
+    leg = chair.part[chair.faces[:, 0]] >= 2
+    below = samples[:, 1] < 0.2 - 0.03 - 1e-5
+    assert below.mean() == pytest.approx(visible[leg].sum() / visible.sum(), abs=0.01)
+    at_top = np.isclose(samples[:, 1], 0.2 - 0.03, atol=1e-6).mean()
+    assert at_top == pytest.approx(0.48 * 0.45 / visible.sum(), abs=0.01)
+
+
+def test_the_similarity_loss_pulls_towards_the_cloud(losses: Losses, labels: Tensor) -> None:
+    torch.manual_seed(7)
+    clouds = losses._sample(losses.decode(labels), 400)
+    shifted = labels.clone()
+    shifted[:, 8] += 0.2
+    shifted.requires_grad_()
+    loss = losses.similarity(shifted, clouds, points=300)
+    loss.backward()
+    assert shifted.grad is not None
+    assert (shifted.grad[:, 8] > 0).all()
+    assert loss.item() > 2 * losses.similarity(labels, clouds, points=300).item()
+
+
+def test_the_objective_weighs_its_terms() -> None:
+    terms = {
+        name: torch.tensor(value)
+        for name, value in {
+            "sem": 1.0, "sem_edit": 10.0, "rec": 100.0, "rec_edit": 1e3, "sim": 1e4
+        }.items()
+    }  # fmt: skip
+    assert total(terms, Weights()).item() == pytest.approx(0.3 * 11 + 30 * 1100 + 50 * 1e4)
+    assert total(terms, Weights(1.0, 0.0, 0.0)).item() == pytest.approx(11)
+    assert total({"sem": torch.tensor(2.0)}, Weights()).item() == pytest.approx(0.6)
+    with pytest.raises(KeyError):
+        total({"other": torch.tensor(2.0)}, Weights())

@@ -1,0 +1,116 @@
+from __future__ import annotations
+
+import pytest
+import torch
+from torch import Tensor, nn
+
+from model_export.networks import PointEncoder, fold_batch_norm
+
+OUTPUTS = 11
+
+
+def encoder(head: tuple[int, ...] | None = None) -> PointEncoder:
+    torch.manual_seed(0)
+    return PointEncoder(torch.linspace(-1, 1, OUTPUTS), torch.linspace(0.1, 2, OUTPUTS), head=head)
+
+
+def used(head: tuple[int, ...] | None = None) -> PointEncoder:
+    """An encoder whose normalisations have seen data and learned something."""
+    network = encoder(head)
+    for layer in network.modules():
+        if isinstance(layer, nn.BatchNorm1d):
+            nn.init.uniform_(layer.weight, 0.5, 1.5)
+            nn.init.uniform_(layer.bias, -0.5, 0.5)
+    for _ in range(5):
+        network(clouds(8, 40))
+    return network.eval()
+
+
+def clouds(count: int, points: int) -> Tensor:
+    """Clouds ``[count, points, 3]`` of different extents."""
+    return torch.rand(count, 1, 3) * torch.randn(count, points, 3)
+
+
+def widths(network: PointEncoder) -> list[tuple[int, int]]:
+    return [
+        (layer.in_features, layer.out_features)
+        for layer in network.modules()
+        if isinstance(layer, nn.Linear)
+    ]
+
+
+def test_the_papers_encoder_has_seven_layers_of_its_widths() -> None:
+    shared = [(3, 64), (64, 128), (128, 128), (128, 256)]
+    assert widths(encoder()) == [*shared, (256, 11), (11, 11), (11, 11)]
+    assert widths(encoder((256, 128))) == [*shared, (256, 256), (256, 128), (128, 11)]
+
+
+def test_the_papers_encoder_has_61203_weights() -> None:
+    folded = fold_batch_norm(encoder())
+    assert sum(weight.numel() for weight in folded.parameters()) == 61203
+
+
+def test_every_layer_but_the_last_is_normalised_and_rectified() -> None:
+    for part in (encoder().shared, encoder().head):
+        kinds = [type(layer) for layer in part.modules() if not isinstance(layer, nn.Sequential)]
+        hidden = kinds if len(kinds) % 3 == 0 else kinds[:-1]
+        assert hidden == [nn.Linear, nn.BatchNorm1d, nn.ReLU] * (len(hidden) // 3)
+    last = encoder().head[-1]
+    assert isinstance(last, nn.Linear)
+    assert last.bias is not None
+
+
+def test_the_order_of_the_points_makes_no_difference() -> None:
+    network, points = used(), clouds(3, 100)
+    with torch.no_grad():
+        expected = network(points)
+        shuffled = network(points[:, torch.randperm(100)])
+    assert torch.allclose(expected, shuffled, atol=1e-6)
+    assert (expected[0] - expected[1]).abs().max() > 5e-3
+
+
+def test_repeated_points_make_no_difference() -> None:
+    network, points = used(), clouds(2, 60)
+    with torch.no_grad():
+        assert torch.allclose(network(points), network(points.repeat(1, 3, 1)), atol=1e-6)
+
+
+def test_each_cloud_is_judged_alone() -> None:
+    network, points = used(), clouds(4, 60)
+    with torch.no_grad():
+        together = network(points)
+        alone = torch.cat([network(cloud[None]) for cloud in points])
+    assert torch.allclose(together, alone, atol=1e-5)
+
+
+def test_outputs_are_standardised() -> None:
+    network = used()
+    points = clouds(2, 60)
+    with torch.no_grad():
+        raw = network.head(network.shared(points.reshape(-1, 3)).reshape(2, 60, -1).amax(dim=1))
+        assert torch.allclose(network(points), network.mean + network.spread * raw, atol=1e-6)
+        network.head[-1].weight.zero_()
+        network.head[-1].bias.zero_()
+        assert torch.equal(network(points), torch.linspace(-1, 1, OUTPUTS).expand(2, -1))
+
+
+@pytest.mark.parametrize("head", [None, (32, 16), ()])
+def test_folding_keeps_the_function(head: tuple[int, ...] | None) -> None:
+    network = used(head)
+    folded = fold_batch_norm(network)
+    assert not any(isinstance(layer, nn.BatchNorm1d) for layer in folded.modules())
+    assert not folded.training
+    points = clouds(5, 100)
+    with torch.no_grad():
+        assert torch.allclose(folded(points), network(points), atol=2e-5)
+
+
+def test_folding_leaves_the_original_as_it_was() -> None:
+    network = used()
+    before = {name: value.clone() for name, value in network.state_dict().items()}
+    folded = fold_batch_norm(network)
+    with torch.no_grad():
+        for weight in folded.parameters():
+            weight.zero_()
+    folded.mean.zero_()
+    assert all(torch.equal(before[name], value) for name, value in network.state_dict().items())

@@ -1,0 +1,240 @@
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from model_export import train
+from model_export.config import Config
+from model_export.losses import Weights
+from model_export.realistic import RealisticShapes
+from model_export.synthetic import Augmentation, SyntheticShapes
+from model_export.train import Trainer, label_statistics, require_scale_free, validation_set
+from service.template.affine import AffineTemplate
+
+
+@pytest.fixture
+def realistic(meshes: Path, tmp_path: Path) -> RealisticShapes:
+    return RealisticShapes(meshes, tmp_path / "cache", seed=5)
+
+
+def same(first: Any, second: Any) -> bool:
+    """Whether two checkpoints are equal to the bit."""
+    if isinstance(first, torch.Tensor):
+        return torch.equal(first, second)
+    if isinstance(first, dict):
+        return first.keys() == second.keys() and all(same(first[k], second[k]) for k in first)
+    if isinstance(first, list | tuple):
+        return len(first) == len(second) and all(map(same, first, second))
+    return bool(first == second)
+
+
+def test_training_lowers_the_loss_and_the_error(small_config: Config) -> None:
+    trainer = Trainer(replace(small_config, steps=150), None)
+    batch = validation_set(trainer.template, 100)
+    before = train.validate(trainer.encoder, trainer.template, batch)
+    losses = [trainer.train_step()["loss"] for _ in range(150)]
+    after = train.validate(trainer.encoder, trainer.template, batch)
+    assert np.mean(losses[-15:]) < 0.5 * np.mean(losses[:15])
+    assert after.error.mean() < 0.7 * before.error.mean()
+    assert after.within[2] > before.within[2]
+
+
+def test_a_resumed_run_goes_on_as_if_it_had_not_stopped(
+    small_config: Config, meshes: Path, tmp_path: Path
+) -> None:
+    config = replace(small_config, cosine=True, augmentation=Augmentation(clutter=0.3))
+
+    def trainer() -> Trainer:
+        return Trainer(config, RealisticShapes(meshes, tmp_path / "cache", config.seed))
+
+    whole = trainer()
+    expected = [whole.train_step() for _ in range(12)]
+    first = trainer()
+    steps = [first.train_step() for _ in range(5)]
+    torch.save(first.state(), tmp_path / "checkpoint.pt")
+    for _ in range(3):
+        first.train_step()
+    second = trainer()
+    second.restore(torch.load(tmp_path / "checkpoint.pt", weights_only=True))
+    steps += [second.train_step() for _ in range(7)]
+    assert steps == expected
+    assert same(second.state(), whole.state())
+
+
+def test_the_seed_decides_the_run(small_config: Config) -> None:
+    first, again = (Trainer(small_config, None) for _ in range(2))
+    # Both draw from the global generator: one after the other, each from its own start.
+    results = []
+    for trainer in (first, again):
+        torch.manual_seed(small_config.seed)
+        results.append([trainer.train_step() for _ in range(3)])
+    assert results[0] == results[1]
+    other = Trainer(replace(small_config, seed=6), None)
+    assert other.train_step() != results[0][0]
+
+
+def test_half_of_each_batch_is_real(
+    small_config: Config, realistic: RealisticShapes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trainer = Trainer(replace(small_config, batch=16), realistic)
+    sizes = []
+    forward = trainer.forward
+
+    def spy(clouds: torch.Tensor) -> torch.Tensor:
+        sizes.append(tuple(clouds.shape))
+        return forward(clouds)
+
+    trainer.forward = spy  # type: ignore[assignment]
+    drawn = []
+    for shapes in (trainer.synthetic, realistic):
+        batch = shapes.batch
+        monkeypatch.setattr(
+            shapes, "batch", lambda n, points, b=batch: (drawn.append(n), b(n, points))[1]
+        )
+    terms = trainer.train_step()
+    assert drawn == [8, 8]
+    assert sizes[0][0] == 16
+    assert set(terms) == {"loss", "sem", "rec", "sem_edit", "rec_edit", "sim"}
+
+
+def test_the_loss_is_the_weighted_sum_of_its_terms(
+    small_config: Config, realistic: RealisticShapes
+) -> None:
+    terms = Trainer(small_config, realistic).train_step()
+    expected = (
+        0.3 * (terms["sem"] + terms["sem_edit"])
+        + 30 * (terms["rec"] + terms["rec_edit"])
+        + 50 * terms["sim"]
+    )
+    assert terms["loss"] == pytest.approx(expected, rel=1e-5)
+
+
+def test_terms_can_be_left_out(small_config: Config, realistic: RealisticShapes) -> None:
+    plain = Trainer(replace(small_config, editing=False, weights=Weights(gamma=0.0)), realistic)
+    assert set(plain.train_step()) == {"loss", "sem", "rec"}
+    alone = Trainer(replace(small_config, editing=True), None)
+    assert set(alone.train_step()) == {"loss", "sem", "rec", "sem_edit", "rec_edit"}
+
+
+def test_the_learning_rate_is_kept_or_decays_along_a_cosine(small_config: Config) -> None:
+    def rates(config: Config) -> list[float]:
+        trainer = Trainer(config, None)
+        found = []
+        for step in (0, 30, 60):
+            trainer.step = step
+            trainer._set_learning_rate()
+            found.append(trainer.optimizer.param_groups[0]["lr"])
+        return found
+
+    assert rates(small_config) == [3e-3] * 3
+    expected = [3e-3 * (0.5 * (1 + math.cos(math.pi * s / 60)) + 1e-3) for s in (0, 30, 60)]
+    assert rates(replace(small_config, cosine=True)) == pytest.approx(expected)
+
+
+def test_clouds_vary_in_size_and_end_at_the_served_one(small_config: Config) -> None:
+    config = replace(small_config, points=(20, 60), final_points=77, final_share=0.2)
+    trainer = Trainer(config, None)
+    sizes = [trainer._points() for _ in range(300)]
+    assert (min(sizes), max(sizes)) == (20, 60)
+    assert np.median(sizes) == pytest.approx(math.sqrt(20 * 60), abs=4)
+    trainer.step = 47
+    assert trainer._points() <= 60
+    trainer.step = 48
+    assert trainer._points() == 77
+
+
+def test_labels_are_standardised_by_their_own_statistics(
+    stand: AffineTemplate, small_config: Config
+) -> None:
+    mean, spread = label_statistics(stand, small_config)
+    assert mean.shape == spread.shape == (6,)
+    shapes = SyntheticShapes(stand, small_config.augmentation, seed=99)
+    batch = shapes.batch(1500, 256)
+    labels = torch.cat([batch.parameters, batch.translation], dim=1)
+    np.testing.assert_allclose(labels.mean(dim=0) / spread, mean / spread, atol=0.2)
+    np.testing.assert_allclose(labels.std(dim=0) / spread, 1.0, atol=0.15)
+    assert (spread >= 1e-3).all()
+    again = label_statistics(stand, small_config)
+    assert torch.equal(mean, again[0])
+    assert torch.equal(spread, again[1])
+
+
+def test_validation_shapes_are_the_same_for_every_run(stand: AffineTemplate) -> None:
+    first, again = validation_set(stand, 100), validation_set(stand, 100)
+    assert first.points.shape == (100, 64, 3)
+    assert torch.equal(first.points, again.points)
+    assert torch.equal(first.parameters, again.parameters)
+    assert len(torch.unique(first.parameters, dim=0)) == 100
+
+
+def test_predictions_are_in_evaluation_mode_and_in_order(small_config: Config) -> None:
+    trainer = Trainer(small_config, None)
+    trainer.train_step()
+    points = trainer.synthetic.batch(60, 64).points
+    predicted = train.predict(trainer.encoder, points)
+    assert predicted.shape == (60, 6)
+    single = train.predict(trainer.encoder, points[41:42])
+    np.testing.assert_allclose(predicted[41:42], single, atol=1e-6)
+
+
+def test_a_run_logs_validates_and_leaves_a_checkpoint(small_config: Config, tmp_path: Path) -> None:
+    trainer = Trainer(replace(small_config, steps=8), None)
+    stopped = train.run(trainer, tmp_path, every=3, until=5)
+    assert trainer.step == 5
+    state = torch.load(tmp_path / "checkpoint.pt", weights_only=True)
+    assert (state["step"], state["config"]["steps"]) == (5, 8)
+    resumed = Trainer(replace(small_config, steps=8), None)
+    resumed.restore(state)
+    result = train.run(resumed, tmp_path, every=3)
+    lines = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    assert [line["step"] for line in lines] == [3, 5, 6, 8]
+    assert lines[1]["within"] == list(stopped.within)
+    assert lines[3]["within"] == list(result.within)
+    assert {"loss", "sem", "rec", "seconds", "edited"} <= set(lines[0])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["checkpoint.pt", "log.jsonl"]
+    assert torch.load(tmp_path / "checkpoint.pt", weights_only=True)["step"] == 8
+
+
+def test_a_finished_run_is_only_measured(small_config: Config, tmp_path: Path) -> None:
+    trainer = Trainer(replace(small_config, steps=1), None)
+    trainer.step = 1
+    result = train.run(trainer, tmp_path)
+    assert trainer.step == 1
+    assert len(result.within) == 3
+
+
+def test_the_command_line_trains_and_resumes(
+    stand_file: Path, meshes: Path, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    config = tmp_path / "small.yaml"
+    config.write_text(
+        f"template: {stand_file}\nsteps: 2\nbatch: 4\npoints: [32, 32]\nfinal_points: 64\n"
+        "shared: [8]\nhead: [8]\n",
+        "utf-8",
+    )
+    monkeypatch.chdir(tmp_path)
+    arguments = ["train", str(config), "--realistic", str(meshes), "--device", "cpu", "--seed", "9"]
+    monkeypatch.setattr("sys.argv", arguments)
+    train.main()
+    assert "8 real shapes to train on, 0 unreadable" in capsys.readouterr().out
+    state = torch.load(tmp_path / "runs" / "small" / "checkpoint.pt", weights_only=True)
+    assert (state["step"], state["config"]["seed"]) == (2, 9)
+    monkeypatch.setattr("sys.argv", [*arguments, "--resume", "--steps", "3"])
+    train.main()
+    state = torch.load(tmp_path / "runs" / "small" / "checkpoint.pt", weights_only=True)
+    assert state["step"] == 3
+
+
+def test_a_template_with_a_fixed_length_is_refused(stand: AffineTemplate) -> None:
+    require_scale_free(stand)
+    fixed = replace(stand, base=stand.base + np.eye(1, 3) * 0.05)
+    with pytest.raises(ValueError, match="'stand' has a constant length"):
+        require_scale_free(fixed)
