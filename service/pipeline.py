@@ -34,6 +34,8 @@ METRIC = ("glb", "gltf")
 MODES = ("blend", "paper")
 CLOSE_CALL = 1.1
 """Two orientations whose fits are within this factor of each other are a close call."""
+MANY_FLIPS = 1e-3
+"""Share of flipped faces above which an answer says so."""
 PLAUSIBLE = (0.1, 100.0)
 """Sizes in metres outside of which a unit must be wrong."""
 
@@ -270,7 +272,7 @@ def _edited(
             "moved": int((vertices != mesh.vertices).any(axis=1).sum()),
         },
         "flipped_faces": flips,
-        "warnings": found.warnings,
+        "warnings": [*found.warnings, *_edit_warnings(found, after, flips, len(mesh.faces))],
     }
     return Edited(data, format, media_type, values | derived[1], report)
 
@@ -319,6 +321,18 @@ def _file_unit(found: Inference, format: str) -> float:
 def _sample(mesh: MeshFile, points: int) -> Samples:
     """The same samples for the same mesh, always."""
     return sample_surface(mesh.vertices, mesh.faces, points, np.random.default_rng(0))
+
+
+def _edit_warnings(found: Inference, after: Array, flips: int, faces: int) -> list[str]:
+    template = found.model.template
+    before = template.broken_relations(found.parameters)
+    broken = [text for text in template.broken_relations(after) if text not in before]
+    warnings = [f"parts now run into each other: {text} is negative" for text in broken]
+    if flips > MANY_FLIPS * faces:
+        warnings.append(
+            f"{flips} faces turned inside out: the edit is more than this mesh can follow"
+        )
+    return warnings
 
 
 def _warnings(found: Inference) -> list[str]:

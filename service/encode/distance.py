@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -12,12 +14,21 @@ from service.template.affine import AffineTemplate
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Cloud:
+    """Samples of an upload in its normalised canonical frame.
+
+    Attributes:
+        points: ``[n, 3]``.
+        normals: ``[n, 3]`` unit normals of the faces that they lie on.
+    """
+
+    points: Array
+    normals: Array
+
+
 def surface_distance(
-    template: AffineTemplate,
-    parameters: Array,
-    translation: Array,
-    points: Array,
-    normals: Array,
+    template: AffineTemplate, parameters: Array, translation: Array, cloud: Cloud
 ) -> float:
     """Symmetric mean distance of the surfaces over the diagonal of the points' bounding box.
 
@@ -27,12 +38,13 @@ def surface_distance(
     Args:
         template: the category.
         parameters, translation: ``[d]``, ``[3]`` of the fit.
-        points, normals: ``[n, 3]`` samples of the upload with their faces' normals.
+        cloud: the upload.
     """
+    points = cloud.points
     visible = template.faces[~template.hidden]
     vertices = template.decode(parameters) + translation
     samples = sample_surface(vertices, visible, len(points), np.random.default_rng(1))
-    there = _one_way(samples.points, points, normals)
+    there = _one_way(samples.points, points, cloud.normals)
     back = _one_way(points, samples.points, samples.normals)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     return 0.5 * (there + back) / diagonal

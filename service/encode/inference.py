@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from service.encode.distance import surface_distance
+from service.encode.distance import Cloud, surface_distance
 from service.encode.model import Model
-from service.encode.refine import Cloud, refine
+from service.encode.refine import STANDARD, Settings, refine
 from service.mesh.surface import Normalization, Samples
 
 Array = NDArray[np.float64]
@@ -42,26 +42,34 @@ class Estimate:
     normalization: Normalization
 
 
-def estimate(model: Model, samples: Samples, refined: bool = True) -> Estimate:
+def estimate(
+    model: Model,
+    samples: Samples,
+    refined: bool = True,
+    settings: Settings = STANDARD,
+    stride: int = 1,
+) -> Estimate:
     """Infer a shape's parameters.
 
     Args:
         model: the category.
         samples: `model.points` samples in canonical orientation, any scale and place.
         refined: go on from the encoder's answer by refinement.
+        settings: of the refinement.
+        stride: every so-many-th sample is refined and measured on; the encoder sees them all.
     """
     normalization = Normalization.of(samples.points)
     points = normalization.apply(samples.points)
     parameters, translation = model.encode(points)
-    distance = surface_distance(model.template, parameters, translation, points, samples.normals)
+    # Samples come in the order of the faces, so that every so-many-th is a fair draw.
+    cloud = Cloud(points[::stride], samples.normals[::stride])
+    distance = surface_distance(model.template, parameters, translation, cloud)
     sigma = np.full(len(parameters), SIGMA_ENCODER)
     encoded = Estimate(parameters, translation, sigma, distance, distance, normalization)
     if not refined:
         return encoded
-    fit = refine(model.template, parameters, translation, Cloud(points, samples.normals))
-    fitted = surface_distance(
-        model.template, fit.parameters, fit.translation, points, samples.normals
-    )
+    fit = refine(model.template, parameters, translation, cloud, settings)
+    fitted = surface_distance(model.template, fit.parameters, fit.translation, cloud)
     if fitted > distance:
         return encoded
     return replace(

@@ -15,7 +15,7 @@ from service.encode.session import EncoderSession
 from service.errors import ModelFault
 from service.mesh.surface import Normalization, sample_surface
 from service.template.affine import AffineTemplate
-from service.template.loader import TemplateError, load_template
+from service.template.loader import load_template
 
 GOLDEN_TOLERANCE = 1e-3
 SMALLEST = 1e-3
@@ -52,8 +52,8 @@ class Model:
 
     @property
     def usual_distance(self) -> float:
-        """`surface_distance` that half of the category's real shapes stay below."""
-        return float(self.card["calibration"]["median_distance"])
+        """Roughly refined `surface_distance` that most of the category's shapes stay below."""
+        return float(self.card["calibration"]["usual_distance"])
 
     def score(self, distance: float) -> float:
         """How much a fit's distance looks like one of the category, from 1 down to 0.
@@ -77,7 +77,8 @@ class Model:
                 "Install the model file and its card from the same export.",
             )
         answer = self._session.run(golden_cloud(self.template, self.points))
-        gap = float(np.abs(answer - np.array(self.card["golden"])).max())
+        golden = np.array(self.card.get("golden", []))
+        gap = float(np.abs(answer - golden).max()) if golden.shape == answer.shape else np.inf
         if not gap < GOLDEN_TOLERANCE:
             raise ModelFault(
                 "model_golden",
@@ -157,7 +158,7 @@ def load_models(directory: Path, threads: int = 1) -> dict[str, Model]:
             card = json.loads(path.read_text("utf-8"))
             template = load_template(own if own.is_file() else str(card["name"]))
             models[card["name"]] = Model(card, template, path.with_suffix(".onnx"), threads)
-        except (OSError, ValueError, KeyError, TemplateError) as error:
+        except (OSError, ValueError, KeyError, TypeError) as error:
             raise ModelFault(
                 "model_unreadable",
                 f"{path.name} can't be loaded: {error}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +11,19 @@ from scipy.spatial import cKDTree
 
 from service.encode.inference import Estimate, estimate
 from service.encode.model import Model
+from service.encode.refine import Settings
 from service.mesh.frame import CANONICAL, Orientation
 from service.mesh.surface import Normalization, Samples, sample_surface
 
-FINALISTS = 3
-"""How many of the encoder's best orientations are refined before one is chosen."""
+FINALISTS = 4
+"""How many of the encoder's best orientations are refined, roughly, before one is chosen."""
 PRIOR = 0.9
 """The canonical orientation wins when its distance times this is the least: files mostly keep to
 the convention, and near-symmetric shapes fit several ways."""
 PROBES = 500
-"""Points that the first, rough ranking looks at."""
+"""Points that the first ranking looks at."""
+ROUGH = Settings(iterations=8, template_points=600)
+"""Enough refinement to tell orientations apart; it sees every third sample."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Candidate:
         model: the category.
         orientation: the upload's up and front.
         samples: the upload's samples, turned to the canonical frame.
-        estimate: refined when refinement was asked for or needed to choose.
+        estimate: of the answer as asked for; of the others, roughly refined.
     """
 
     model: Model
@@ -66,48 +69,44 @@ def recognise(
         models: the categories it may be of.
         samples: the upload's samples in its own frame, by cloud size.
         orientations: those it may have, the canonical one first.
-        refined: refine; where there is more than one orientation to choose from, the best few are
-            refined to choose between them whatever this says.
+        refined: refine the answer.  To choose between orientations the best few are refined
+            roughly, whatever this says.
 
     Returns:
         At least one candidate for each model; the first is the answer.
     """
-    candidates: list[Candidate] = []
-    for model in models:
-        drawn = samples[model.points]
-        if len(orientations) == 1:
-            turned_samples = turned(drawn, orientations[0])
-            answer = estimate(model, turned_samples, refined)
-            candidates.append(Candidate(model, orientations[0], turned_samples, answer))
-            continue
-        candidates += _search(model, drawn, orientations)
+    if len(models) == len(orientations) == 1:
+        own = turned(samples[models[0].points], orientations[0])
+        return [Candidate(models[0], orientations[0], own, estimate(models[0], own, refined))]
+    candidates = [
+        candidate
+        for model in models
+        for candidate in _search(model, samples[model.points], orientations)
+    ]
     ranked = sorted(candidates, key=lambda candidate: candidate.rank)
     best = ranked[0]
-    if not refined and len(orientations) > 1:
-        plain = estimate(best.model, best.samples, refined=False)
-        ranked[0] = Candidate(best.model, best.orientation, best.samples, plain)
-    return ranked
+    answer = estimate(best.model, best.samples, refined)
+    return [replace(best, estimate=answer), *ranked[1:]]
 
 
 def _search(model: Model, samples: Samples, orientations: Sequence[Orientation]) -> list[Candidate]:
-    """Refined candidates for the best few orientations.
+    """Roughly refined candidates for the best few orientations.
 
     A first orientation that fits as well as shapes of the category usually do is taken at once.
     """
-    found: list[Candidate] = []
-    first = turned(samples, orientations[0])
-    found.append(Candidate(model, orientations[0], first, estimate(model, first)))
-    if found[0].estimate.distance <= model.usual_distance:
-        return found
-    rough = [(_rough_distance(model, samples, o), o) for o in orientations[1:]]
-    rough.sort(key=lambda pair: pair[0])
-    for _, orientation in rough[:FINALISTS]:
-        turned_samples = turned(samples, orientation)
-        found.append(Candidate(model, orientation, turned_samples, estimate(model, turned_samples)))
-    return found
+    first = _roughly(model, samples, orientations[0])
+    if len(orientations) == 1 or first.estimate.distance <= model.usual_distance:
+        return [first]
+    others = sorted(orientations[1:], key=lambda o: _encoded_distance(model, samples, o))
+    return [first, *(_roughly(model, samples, other) for other in others[:FINALISTS])]
 
 
-def _rough_distance(model: Model, samples: Samples, orientation: Orientation) -> float:
+def _roughly(model: Model, samples: Samples, orientation: Orientation) -> Candidate:
+    own = turned(samples, orientation)
+    return Candidate(model, orientation, own, estimate(model, own, True, ROUGH, stride=3))
+
+
+def _encoded_distance(model: Model, samples: Samples, orientation: Orientation) -> float:
     """Mean two-way distance of a few points for the encoder's answer alone."""
     points = turned(samples, orientation).points
     points = Normalization.of(points).apply(points)

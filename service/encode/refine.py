@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from service.encode.distance import Cloud
 from service.encode.model import SMALLEST
 from service.mesh.surface import sample_surface
 from service.template.affine import AffineTemplate
@@ -44,16 +45,7 @@ class Settings:
     pull: float = 5e-6
 
 
-@dataclass(frozen=True)
-class Cloud:
-    """The upload's samples, indexed for matching.
-
-    Attributes:
-        points, normals: ``[n, 3]`` in the normalised frame.
-    """
-
-    points: Array
-    normals: Array
+STANDARD = Settings()
 
 
 @dataclass(frozen=True)
@@ -78,7 +70,7 @@ def refine(
     parameters: Array,
     translation: Array,
     cloud: Cloud,
-    settings: Settings = Settings(),
+    settings: Settings = STANDARD,
 ) -> Fit:
     """Fit the template to a cloud.
 

@@ -26,6 +26,7 @@ class AffineTemplate:
         parameters: the ``d`` parameters, in order.
         derived: further dimensions by name.
         relations: ``[r, 1 + d]`` affine rows that are non-negative on sensible shapes.
+        relation_texts: the same as the file writes them.
         base: ``[V, 3]`` vertices at all-zero parameters.
         jacobian: ``[V, 3, d]``; vertices are ``base + jacobian @ f``.
         faces: ``[F, 3]`` int64, counter-clockwise from outside.
@@ -43,6 +44,7 @@ class AffineTemplate:
     parameters: tuple[Parameter, ...]
     derived: dict[str, Derived]
     relations: Array
+    relation_texts: tuple[str, ...]
     base: Array
     jacobian: Array
     faces: NDArray[np.int64]
@@ -75,6 +77,13 @@ class AffineTemplate:
     def frames(self, f: Array) -> Array:
         """``[P, 3, 4]`` map from each part's unit shape to space, for ``f [d]``."""
         return self.frame_base + self.frame_jacobian @ f
+
+    def broken_relations(self, f: Array) -> list[str]:
+        """The relations that parameters ``f [d]`` do not keep, as the file writes them."""
+        kept = self.relations[:, 0] + self.relations[:, 1:] @ f >= 0.0
+        return [
+            text for text, is_kept in zip(self.relation_texts, kept, strict=True) if not is_kept
+        ]
 
     def anchor(self, name: str) -> tuple[Array, Array]:
         """Constant ``[3]`` and Jacobian ``[3, d]`` of the point that an edit can hold in place."""

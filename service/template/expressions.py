@@ -45,10 +45,8 @@ class _Evaluator:
         self.names = names
 
     def visit_node(self, node: ast.expr) -> Affine:
-        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-            row = np.zeros(1 + len(self.names))
-            row[0] = node.value
-            return row
+        if isinstance(node, ast.Constant):
+            return self._number(node)
         if isinstance(node, ast.Name):
             return self._parameter(node.id)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
@@ -57,6 +55,14 @@ class _Evaluator:
         if isinstance(node, ast.BinOp):
             return self._binary(node)
         raise ExpressionError(f"{self.source!r}: {ast.unparse(node)!r} is not allowed here")
+
+    def _number(self, node: ast.Constant) -> Affine:
+        # True and False are integers to Python, and what a stray YAML yes or no becomes.
+        if isinstance(node.value, bool) or not isinstance(node.value, int | float):
+            raise ExpressionError(f"{self.source!r}: {ast.unparse(node)!r} is not allowed here")
+        row = np.zeros(1 + len(self.names))
+        row[0] = node.value
+        return row
 
     def _parameter(self, name: str) -> Affine:
         if name not in self.names:

@@ -35,9 +35,12 @@ def load_template(source: str | Path) -> AffineTemplate:
         if not file.is_file():
             raise TemplateError(f"there is no built-in template named {source!r}")
         text = file.read_text("utf-8")
-    else:
-        text = Path(source).read_text("utf-8")
-    return compile_template(yaml.safe_load(text))
+        return compile_template(yaml.safe_load(text))
+    try:
+        spec = yaml.safe_load(Path(source).read_text("utf-8"))
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise TemplateError(f"{source} can't be read: {error}") from error
+    return compile_template(spec)
 
 
 def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:
@@ -55,6 +58,7 @@ def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:
             parameters=parameters,
             derived={n: _derived(n, e, names) for n, e in spec.get("derived", {}).items()},
             relations=_rows(spec.get("relations", []), names),
+            relation_texts=tuple(map(str, spec.get("relations", []))),
             anchors={name: _rows(point, names) for name, point in spec["keep"].items()},
             **_assemble(parts),
         )
@@ -62,6 +66,10 @@ def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:
         raise TemplateError(f"the entry {error} is missing") from error
     except ExpressionError as error:
         raise TemplateError(str(error)) from error
+    except TemplateError:
+        raise
+    except (AttributeError, TypeError, ValueError) as error:
+        raise TemplateError(f"an entry has the wrong form: {error}") from error
 
 
 class _Part:
