@@ -13,7 +13,7 @@ import torch
 from tqdm import tqdm
 
 from model_export.metrics import Recovery, recovery
-from model_export.realistic import RealisticShape, find_shapes, load_cloud
+from model_export.realistic import CLOUD_SIZE, RealisticShape, find_shapes, load_cloud
 from model_export.synthetic import Augmentation, SyntheticShapes
 from service.encode.distance import Cloud
 from service.encode.inference import Estimate, estimate
@@ -27,7 +27,9 @@ TEST_SEED = 10_000_019
 
 def clouds_of(shapes: Sequence[RealisticShape], cache: Path, points: int) -> list[np.ndarray]:
     """Normalised clouds ``[points, 3]`` of real shapes."""
-    clouds = [load_cloud(shape, cache)[:points] for shape in shapes]
+    # Samples come in the order of the faces: spread the choice over all of them.
+    chosen = np.linspace(0, CLOUD_SIZE - 1, points).round().astype(int)
+    clouds = [load_cloud(shape, cache)[chosen] for shape in shapes]
     return [Normalization.of(cloud).apply(cloud).astype(np.float32) for cloud in clouds]
 
 

@@ -96,12 +96,21 @@ def refine(
         damped = hessian + 1e-4 * np.diag(np.diag(hessian)) + 1e-9 * np.eye(len(state))
         step = np.linalg.solve(damped, -system.gradient + prior * (start - state))
         state = state + np.clip(step, -0.15, 0.15)
-        state[: len(parameters)] = np.maximum(state[: len(parameters)], SMALLEST)
+        state[: len(parameters)] = _admissible(template, state[: len(parameters)])
     system = _normal_equations(moving, matcher, state, settings.fine, settings.slide)
     covariance = np.linalg.inv(system.hessian + np.diag(settings.pull / spread**2))
     sigma = np.sqrt(np.diag(covariance) * system.cost / SIGMA_SAMPLES)
     d = len(parameters)
     return Fit(state[:d], state[d:], sigma[:d], system.cost)
+
+
+def _admissible(template: AffineTemplate, parameters: Array) -> Array:
+    """The nearest parameters, or nearly so, that are positive and keep the template's relations."""
+    for constant, *row in template.relations:
+        lack = -(constant + parameters @ row)
+        if lack > 0.0:
+            parameters = parameters + np.array(row) * (lack / np.dot(row, row))
+    return np.maximum(parameters, SMALLEST)
 
 
 SIGMA_SAMPLES = 40

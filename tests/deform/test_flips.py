@@ -56,13 +56,15 @@ def test_a_turned_face_whose_map_turned_with_it_is_none() -> None:
 
 
 def test_area_vectors_are_carried_by_the_cofactors() -> None:
-    # Steep shear: a normal carried by the map itself would end up on the wrong side.
-    linear = np.array([[1.0, 0, 0], [-5.0, 1, 0], [0, 0, 1]])
+    # A steep shear takes the normal (0, 1, 0) to (5, 1, 0); as a vector it would stay.
+    shear = np.array([[1.0, 0, 0], [-5.0, 1, 0], [0, 0, 1]])
     before = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, -1]])
-    maps = np.broadcast_to(linear, (3, 3, 3))
-    assert count_flips(before, before @ linear.T, np.array([[0, 1, 2]]), maps) == 0
-    wrong = (before @ linear.T)[[0, 2, 1]]
-    assert count_flips(before, wrong, np.array([[0, 1, 2]]), maps) == 1
+    maps, face = np.broadcast_to(shear, (3, 3, 3)), np.array([[0, 1, 2]])
+    assert count_flips(before, before @ shear.T, face, maps) == 0
+    against = np.array([[0.0, 0, 0], [1, 1, 0], [0, 0, -1]])  # its normal is (-1, 1, 0)
+    along = np.array([[0.0, 0, 0], [-1, -1, 0], [0, 0, -1]])  # and this one's (1, -1, 0)
+    assert count_flips(before, against, face, maps) == 1
+    assert count_flips(before, along, face, maps) == 0
 
 
 def test_a_map_that_flattens_is_no_fault() -> None:
@@ -77,4 +79,12 @@ def test_faces_too_small_to_have_a_side_are_left_out() -> None:
     faces = np.concatenate([FACES, len(VERTICES) + np.array([[0, 1, 2]])])
     maps = np.broadcast_to(np.eye(3), (len(before), 3, 3))
     assert count_flips(before, after, faces, maps) == 0
-    assert count_flips(100 * before, 100 * after, faces, maps) == 0
+    assert count_flips(1e6 * before, 1e6 * after, faces, maps) == 0
+
+
+def test_the_unit_of_the_mesh_makes_no_difference() -> None:
+    after = VERTICES @ np.diag([-1.0, 1.0, -1.0])
+    counted = flips(after, np.eye(3))
+    maps = np.broadcast_to(np.eye(3), (len(VERTICES), 3, 3))
+    for size in (1e-4, 1e4):
+        assert count_flips(size * VERTICES, size * after, FACES, maps) == counted

@@ -56,6 +56,11 @@ def test_every_face_has_its_share_of_the_points_to_within_two(seed: int) -> None
     assert np.abs(drawn - count * AREAS / AREAS.sum()).max() <= 2
 
 
+def test_a_face_too_small_for_a_point_of_its_own_has_one_at_times() -> None:
+    drawn = np.array([np.bincount(draw(2, seed).faces, minlength=4) for seed in range(600)])
+    np.testing.assert_allclose(drawn.mean(axis=0), 2 * AREAS / AREAS.sum(), atol=0.08)
+
+
 def test_a_density_shifts_the_shares() -> None:
     density = np.array([4.0, 9.0, 1.0, 0.0])
     drawn = np.bincount(draw(600, density=density).faces, minlength=4)

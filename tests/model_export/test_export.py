@@ -55,9 +55,7 @@ def test_the_exported_network_answers_like_the_trained_one(
     assert np.ptp(answers, axis=0).max() > 100 * gap
 
 
-def test_a_network_that_answers_otherwise_is_refused(
-    state: dict[str, Any], network: Path
-) -> None:
+def test_a_network_that_answers_otherwise_is_refused(state: dict[str, Any], network: Path) -> None:
     encoder = export.load_encoder(state)
     with torch.no_grad():
         encoder.head[-1].bias[2] += 0.1

@@ -113,9 +113,7 @@ def test_edits_are_log_uniform_factors_on_a_random_subset() -> None:
     assert edited.double().sum(dim=1).mean().item() == pytest.approx(1 + 7 / 2, abs=0.1)
     np.testing.assert_allclose(edited.double().mean(dim=0), 4.5 / 8, atol=0.04)
     log = torch.log(factors[edited])
-    np.testing.assert_allclose(
-        np.quantile(log, [0.25, 0.5, 0.75]), [-0.256, 0, 0.256], atol=0.02
-    )
+    np.testing.assert_allclose(np.quantile(log, [0.25, 0.5, 0.75]), [-0.256, 0, 0.256], atol=0.02)
 
 
 def test_edits_repeat_with_the_seed() -> None:
@@ -126,9 +124,7 @@ def test_edits_repeat_with_the_seed() -> None:
     assert not torch.equal(first, other)
 
 
-def test_the_similarity_loss_is_the_two_way_squared_chamfer(
-    losses: Losses, labels: Tensor
-) -> None:
+def test_the_similarity_loss_is_the_two_way_squared_chamfer(losses: Losses, labels: Tensor) -> None:
     clouds = 0.5 * torch.randn(4, 60, 3, generator=torch.Generator().manual_seed(4))
     torch.manual_seed(5)
     samples = losses._sample(losses.decode(labels), 40).double().numpy()

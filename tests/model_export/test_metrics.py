@@ -38,9 +38,7 @@ def test_shares_are_those_of_the_vertices_counted_one_by_one(
 ) -> None:
     predicted = true + np.random.default_rng(1).normal(0, 0.02, true.shape)
     result = recovery(chair, predicted, true, seed=3)
-    factors = np.exp(
-        np.random.default_rng(3).uniform(np.log(0.6), np.log(1.67), (len(true), 8))
-    )
+    factors = np.exp(np.random.default_rng(3).uniform(np.log(0.6), np.log(1.67), (len(true), 8)))
     for edit, shares in ((np.ones_like(factors), result.within), (factors, result.edited)):
         gaps = np.concatenate([
             np.linalg.norm(chair.jacobian @ ((p - t)[:8] * e) + (p - t)[8:], axis=1)

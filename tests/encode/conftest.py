@@ -1,0 +1,103 @@
+"""The installed chair model, clouds with known answers, and networks of next to no layers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from numpy.typing import NDArray
+from onnx import TensorProto, helper
+
+import service
+from service.encode.distance import Cloud
+from service.encode.model import Model, load_models
+from service.mesh.surface import Normalization, Samples, sample_surface
+from service.template.affine import AffineTemplate
+from service.template.loader import load_template
+
+Array = NDArray[np.float64]
+Labelled = tuple[Cloud, Array, Array]
+WriteNetwork = Callable[..., Path]
+
+PLAIN = {
+    "back_height": 0.42,
+    "back_thickness": 0.04,
+    "seat_thickness": 0.06,
+    "seat_depth": 0.45,
+    "seat_width": 0.48,
+    "leg_height": 0.40,
+    "leg_depth": 0.05,
+    "leg_width": 0.05,
+}
+
+
+@pytest.fixture(scope="session")
+def chair() -> AffineTemplate:
+    return load_template("chair")
+
+
+@pytest.fixture(scope="session")
+def plain(chair: AffineTemplate) -> Array:
+    """``[8]`` parameters of an ordinary chair, in metres."""
+    return np.array([PLAIN[name] for name in chair.names])
+
+
+@pytest.fixture(scope="session")
+def chair_model() -> Model:
+    """The installed model."""
+    return load_models(Path(service.__file__).parent / "models")["chair"]
+
+
+def surface(template: AffineTemplate, f: Array, count: int, seed: int) -> Samples:
+    """Samples of the visible faces of the template at ``f [d]``."""
+    visible = template.faces[~template.hidden]
+    return sample_surface(template.decode(f), visible, count, np.random.default_rng(seed))
+
+
+@pytest.fixture(scope="session")
+def chair_samples(chair: AffineTemplate, plain: Array) -> Samples:
+    """2840 samples of the ordinary chair, in metres, canonically oriented."""
+    return surface(chair, plain, 2840, 1)
+
+
+@pytest.fixture(scope="session")
+def labelled(chair: AffineTemplate) -> Callable[..., Labelled]:
+    """Makes a noisy normalised cloud of a chair, with its parameters and translation."""
+
+    def make(f: Array, noise: float = 0.0, seed: int = 0, count: int = 2840) -> Labelled:
+        samples = surface(chair, f, count, seed)
+        normalization = Normalization.of(samples.points)
+        points = normalization.apply(samples.points)
+        points = points + noise * np.random.default_rng(seed).standard_normal(points.shape)
+        translation = -normalization.center * normalization.scale
+        return Cloud(points, samples.normals), f * normalization.scale, translation
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def write_network() -> WriteNetwork:
+    """Writes a network that answers given numbers, then the cloud's largest x, y and z."""
+
+    def write(path: Path, answer: list[float], shape: tuple[int | str, ...] = (1, 50, 3)) -> Path:
+        axes = helper.make_tensor("axes", TensorProto.INT64, [1], [1])
+        row = helper.make_tensor("row", TensorProto.FLOAT, [1, len(answer)], answer)
+        largest = "largest" if answer else "outputs"
+        nodes = [helper.make_node("ReduceMax", ["points", "axes"], [largest], keepdims=0)]
+        if answer:
+            nodes.append(helper.make_node("Concat", ["row", "largest"], ["outputs"], axis=1))
+        graph = helper.make_graph(
+            nodes,
+            "network",
+            [helper.make_tensor_value_info("points", TensorProto.FLOAT, shape)],
+            [helper.make_tensor_value_info("outputs", TensorProto.FLOAT, None)],
+            [axes, row],
+        )
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
+        onnx.save(model, path)
+        return path
+
+    return write

@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.encode.session import EncoderSession
+from service.errors import ModelFault
+
+
+def test_a_cloud_becomes_a_row_of_numbers(tmp_path: Path, write_network: Any) -> None:
+    session = EncoderSession(write_network(tmp_path / "a.onnx", [1.5, -2.0]))
+    assert session.points == 50
+    cloud = np.random.default_rng(0).normal(size=(50, 3))
+    answer = session.run(cloud)
+    assert (answer.shape, answer.dtype) == ((5,), np.float64)
+    np.testing.assert_allclose(answer, [1.5, -2.0, *cloud.max(axis=0)], rtol=1e-6)
+
+
+def test_any_layout_and_precision_will_do(tmp_path: Path, write_network: Any) -> None:
+    session = EncoderSession(write_network(tmp_path / "a.onnx", []), threads=2)
+    cloud = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
+    expected = session.run(cloud)
+    assert np.array_equal(session.run(np.asfortranarray(cloud)), expected)
+    assert np.array_equal(session.run(np.repeat(cloud, 2, axis=0)[::2]), expected)
+    assert np.array_equal(session.run(cloud.astype(np.float64)), expected)
+
+
+@pytest.mark.parametrize(
+    "shape", [(1, "points", 3), (2, 50, 3), (1, 50, 4), (50, 3), (1, 1, 50, 3)]
+)
+def test_a_network_of_another_shape_is_refused(
+    tmp_path: Path, write_network: Any, shape: tuple[int | str, ...]
+) -> None:
+    path = write_network(tmp_path / "odd.onnx", [], shape)
+    with pytest.raises(ModelFault) as caught:
+        EncoderSession(path)
+    assert caught.value.code == "model_shape"
+    assert caught.value.detail.startswith("odd.onnx takes ")
+
+
+@pytest.mark.parametrize("content", [b"", b"no network", None])
+def test_a_file_that_is_no_network_is_refused(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "bad.onnx"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ModelFault) as caught:
+        EncoderSession(path)
+    assert caught.value.code == "model_unreadable"
+    assert "bad.onnx" in caught.value.detail
