@@ -15,8 +15,10 @@ from model_export.pictures import BLUE, GREY, YELLOW, Panel, save_sheet
 from model_export.realistic import RealisticShape, find_shapes
 from service.edits import Change
 from service.encode.model import Model, load_models
+from service.inference import Inference
 from service.mesh.formats import read_mesh
-from service.pipeline import EditOptions, Inference, InferOptions, Upload, edit, infer
+from service.pipeline import edit, infer
+from service.requests import EditOptions, InferOptions, Upload
 
 UPRIGHT = InferOptions(up="+y", front="+z")
 

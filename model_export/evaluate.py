@@ -16,7 +16,7 @@ from model_export.metrics import Recovery, recovery
 from model_export.realistic import CLOUD_SIZE, RealisticShape, find_shapes, load_cloud
 from model_export.synthetic import Augmentation, SyntheticShapes
 from service.encode.distance import Cloud
-from service.encode.inference import Estimate, estimate
+from service.encode.estimate import Estimate, estimate
 from service.encode.model import Model, load_models
 from service.encode.refine import refine
 from service.mesh.formats import read_mesh

@@ -12,21 +12,15 @@ import trimesh
 from trimesh.exchange.export import export_mesh
 
 import service
+from service.edited import Edited
 from service.edits import Change, parse_edits
 from service.encode.model import Model, load_models
 from service.errors import InvalidRequest, ShapeError
+from service.inference import Inference
 from service.mesh.formats import READERS, read_mesh
 from service.mesh.frame import CANONICAL, Orientation
-from service.pipeline import (
-    UNITS,
-    Edited,
-    EditOptions,
-    Inference,
-    InferOptions,
-    Upload,
-    edit,
-    infer,
-)
+from service.pipeline import edit, infer
+from service.requests import UNITS, EditOptions, InferOptions, Upload
 
 MODELS = Path(service.__file__).parent / "models"
 VALUES = {

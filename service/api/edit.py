@@ -18,9 +18,10 @@ from service.api.mesh_response import mesh_response
 from service.api.problems import documented
 from service.api.schemas import MESH_CONTENT, MESH_HEADERS, EditReport
 from service.api.store import MeshStore
+from service.edited import Edited
 from service.edits import parse_edits
 from service.encode.model import Model
-from service.pipeline import Edited, Upload
+from service.requests import Upload
 
 JSON = "application/json"
 

@@ -13,7 +13,7 @@ from starlette.formparsers import MultiPartParser
 
 from service.api.store import MeshStore
 from service.errors import InvalidRequest, UnsupportedFormat
-from service.pipeline import EditOptions, InferOptions, Upload
+from service.requests import EditOptions, InferOptions, Upload
 
 # Uploads are bounded and are read into memory anyway: keep them off the disk, so that a container
 # with a read-only root needs no temporary folder.

@@ -15,7 +15,7 @@ from service.api.problems import documented
 from service.api.schemas import InferReport
 from service.api.store import MeshStore
 from service.encode.model import Model
-from service.pipeline import InferOptions, Upload
+from service.requests import InferOptions, Upload
 
 router = APIRouter(tags=["shapes"])
 

@@ -9,7 +9,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from service.api.filenames import clean, content_disposition
-from service.pipeline import Upload
+from service.requests import Upload
 
 OPAQUE = "application/octet-stream"
 

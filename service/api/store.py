@@ -6,7 +6,7 @@ from collections import OrderedDict
 from threading import Lock
 
 from service.errors import NotFound
-from service.pipeline import Upload
+from service.requests import Upload
 
 
 class MeshStore:

@@ -26,18 +26,22 @@ class Dimensions:
         template: AffineTemplate,
         parameters: Array,
         vertices: Array,
-        jacobian: NDArray[np.floating],
+        scale: float = 1.0,
+        jacobian: NDArray[np.floating] | None = None,
     ) -> None:
         """
         Args:
             template: the category.
             parameters: ``[d]`` before the edit.
-            vertices: ``[V, 3]`` of the mesh, in canonical orientation.
-            jacobian: ``[V, 3, d]`` displacement of each vertex per unit of each parameter.
+            vertices: ``[V, 3]`` of the mesh, in canonical orientation and any unit.
+            scale: lengths in the vertices' unit per length in the parameters' unit.
+            jacobian: ``[V, 3, d]`` displacement of each vertex per unit of each parameter; without
+                it the dimensions can be read, not changed.
         """
         self.template = template
         self.parameters = parameters
         self.vertices = vertices
+        self.scale = scale
         self.jacobian = jacobian
 
     def derived(self, parameters: Array) -> dict[str, float]:
@@ -85,8 +89,11 @@ class Dimensions:
 
     def _coordinates(self, dimension: Derived, parameters: Array) -> Array:
         axis = "xyz".index(dimension.extent or "x")
-        moved: Array = self.jacobian[:, axis] @ (parameters - self.parameters)
-        return self.vertices[:, axis] + moved
+        coordinates: Array = self.vertices[:, axis] / self.scale
+        change = parameters - self.parameters
+        if self.jacobian is None or not change.any():
+            return coordinates
+        return coordinates + self.jacobian[:, axis] @ change
 
     def _reach(self, dimension: Derived, target: float, values: Array, fixed: set[int]) -> Array:
         """Scale the parameters behind a dimension until it has its target value."""
@@ -113,6 +120,8 @@ class Dimensions:
     def _slope(self, dimension: Derived, values: Array, direction: Array) -> float:
         if dimension.row is not None:
             return float(dimension.row[1:] @ direction)
+        if self.jacobian is None:
+            return 0.0
         axis = "xyz".index(dimension.extent or "x")
         coordinates = self._coordinates(dimension, values)
         ends = self.jacobian[[coordinates.argmax(), coordinates.argmin()], axis] @ direction

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from service.encode.inference import Estimate, estimate
+from service.encode.estimate import Estimate, estimate
 from service.encode.model import Model
 from service.encode.refine import Settings
 from service.mesh.frame import CANONICAL, Orientation
@@ -51,9 +51,10 @@ class Candidate:
 
 def turned(samples: Samples, orientation: Orientation) -> Samples:
     """The samples in the canonical frame."""
-    turn = orientation.rotation.T
-    return Samples(
-        samples.points @ turn, samples.normals @ turn, samples.faces, samples.barycentric
+    return replace(
+        samples,
+        points=orientation.to_canonical(samples.points),
+        normals=orientation.to_canonical(samples.normals),
     )
 
 

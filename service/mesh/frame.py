@@ -36,6 +36,29 @@ class Orientation:
         up, front = np.array(AXES[self.up]), np.array(AXES[self.front])
         return np.stack([np.cross(up, front), up, front]).astype(np.float64)
 
+    def to_canonical(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points ``[n, 3]`` of the upload's own axes in the canonical ones."""
+        axes, signs = _columns(self.rotation)
+        return points if self == CANONICAL else points[:, axes] * signs
+
+    def to_own(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Back from the canonical axes; zeros stay zeros."""
+        axes, signs = _columns(self.rotation.T)
+        return points if self == CANONICAL else points[:, axes] * signs
+
+    def maps_to_own(self, maps: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Linear maps ``[n, 3, 3]`` of canonical space in the upload's own axes."""
+        axes, signs = _columns(self.rotation.T)
+        if self == CANONICAL:
+            return maps
+        return maps[:, axes][:, :, axes] * np.outer(signs, signs).astype(maps.dtype)
+
+
+def _columns(rotation: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """For a signed permutation: which column each row picks, and its sign."""
+    axes = np.abs(rotation).argmax(axis=1)
+    return axes, rotation[np.arange(3), axes]
+
 
 CANONICAL = Orientation("+y", "+z")
 

@@ -13,7 +13,7 @@ from fastapi import FastAPI
 
 from service import main, pipeline
 from service.errors import ModelFault
-from service.pipeline import Upload
+from service.requests import Upload
 from service.settings import Settings
 
 IDENTITY = {"name": "stool", "version": "1", "digest": "sha256-00"}

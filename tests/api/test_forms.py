@@ -6,7 +6,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.pipeline import EditOptions, InferOptions
+from service.requests import EditOptions, InferOptions
 
 MESH = ("chair.obj", b"abc", "model/obj")
 

@@ -6,7 +6,7 @@ from starlette.responses import Response
 
 from service.api.mesh_response import MEDIA_TYPES, mesh_response
 from service.mesh.formats import READERS
-from service.pipeline import Upload
+from service.requests import Upload
 
 
 def respond(mesh: Upload, if_none_match: str | None = None) -> Response:

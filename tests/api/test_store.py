@@ -7,7 +7,7 @@ import pytest
 
 from service.api.store import MeshStore
 from service.errors import NotFound
-from service.pipeline import Upload
+from service.requests import Upload
 
 
 def mesh(content: bytes, name: str = "a.obj") -> Upload:

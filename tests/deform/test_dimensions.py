@@ -28,7 +28,7 @@ F = np.array([VALUES[name] for name in CHAIR.names])
 
 def box_chair() -> Dimensions:
     """The template itself as the bound mesh: it moves exactly as its parameters say."""
-    return Dimensions(CHAIR, F, CHAIR.decode(F), CHAIR.jacobian)
+    return Dimensions(CHAIR, F, CHAIR.decode(F), jacobian=CHAIR.jacobian)
 
 
 def with_wings() -> Dimensions:
@@ -44,7 +44,7 @@ def with_wings() -> Dimensions:
         CHAIR,
         F,
         np.concatenate([vertices, extra]),
-        np.concatenate([jacobian, jacobian[[top, left, right]]]).astype(np.float32),
+        jacobian=np.concatenate([jacobian, jacobian[[top, left, right]]]).astype(np.float32),
     )
 
 
@@ -126,7 +126,7 @@ def test_an_extent_whose_outermost_vertex_changes_is_still_exact() -> None:
     vertices = np.concatenate([CHAIR.decode(F), [[0.30, 0, 0], [-0.30, 0, 0]]])
     jacobian = np.concatenate([CHAIR.jacobian, np.zeros((2, 3, 8))])
     jacobian[-2, 0, CHAIR.names.index("seat_width")] = 0.1
-    dimensions = Dimensions(CHAIR, F, vertices, jacobian)
+    dimensions = Dimensions(CHAIR, F, vertices, jacobian=jacobian)
     values = dimensions.after({"total_width": Change("set", 0.9)})
     moved = vertices + jacobian @ (values - F)
     assert np.ptp(moved[:, 0]) == pytest.approx(0.9, rel=1e-6)
@@ -220,5 +220,7 @@ def test_the_mesh_is_left_as_it_was() -> None:
 
 def test_dimensions_by_extent_only_need_no_row() -> None:
     derived = {n: replace(d, row=None, extent="y") for n, d in CHAIR.derived.items()}
-    dimensions = Dimensions(replace(CHAIR, derived=derived), F, CHAIR.decode(F), CHAIR.jacobian)
+    dimensions = Dimensions(
+        replace(CHAIR, derived=derived), F, CHAIR.decode(F), jacobian=CHAIR.jacobian
+    )
     np.testing.assert_allclose(list(dimensions.derived(F).values()), 0.82)

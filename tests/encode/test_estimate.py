@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from service.encode import inference
+from service.encode import estimate as inference
 from service.encode.distance import Cloud, surface_distance
-from service.encode.inference import SIGMA_ENCODER, SIGMA_FLOOR, estimate
+from service.encode.estimate import SIGMA_ENCODER, SIGMA_FLOOR, estimate
 from service.encode.model import SMALLEST, Model
 from service.encode.refine import Fit
 from service.mesh.surface import Samples
