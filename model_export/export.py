@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import shutil
 import warnings
 from collections import Counter
 from pathlib import Path
@@ -13,7 +14,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from model_export.evaluate import clouds_of, real_fits, synthetic_table
+from model_export.calibrate import calibrate
+from model_export.evaluate import clouds_of, real_fits, synthetic_samples, synthetic_table
 from model_export.networks import PointEncoder, fold_batch_norm
 from model_export.realistic import RealisticShape, find_shapes
 from service.encode.model import Model, file_digest, golden_cloud
@@ -98,10 +100,16 @@ def build_card(
             for p in template.parameters
         ],
         "training": {
-            "steps": state["step"],
-            "hours": round(state["seconds"] / 3600, 2),
-            "place": state["place"],
-            "config": state["config"],
+            "hours": round(sum(run["seconds"] for run in [*state["earlier"], state]) / 3600, 2),
+            "runs": [
+                {
+                    "steps": run["step"],
+                    "hours": round(run["seconds"] / 3600, 2),
+                    "place": run["place"],
+                    "config": run["config"],
+                }
+                for run in [*state["earlier"], state]
+            ],
         },
         "golden": [round(float(value), 6) for value in golden],
     }  # fmt: skip
@@ -139,6 +147,9 @@ def main() -> None:
     template = load_template(state["config"]["template"])
     encoder = load_encoder(state)
     arguments.out.mkdir(parents=True, exist_ok=True)
+    source = Path(state["config"]["template"])
+    if source.suffix in (".yaml", ".yml"):
+        shutil.copyfile(source, arguments.out / f"{template.name}.yaml")
     path = arguments.out / f"{template.name}.onnx"
     write_onnx(encoder, template.points, path)
     shapes = find_shapes(arguments.realistic) if arguments.realistic else []
@@ -148,6 +159,8 @@ def main() -> None:
     card = build_card(template, state, path, arguments.version)
     card["data"] = describe_data(shapes)
     model = Model(card, template, path, threads=1)
+    ordinary = [s for s in shapes if not s.held_out and s.info.get("core", True)]
+    card["calibration"] = calibrate(model, ordinary, synthetic_samples(model, 100)[0])
     card["metrics"] = {"synthetic": synthetic_table(model, arguments.count)}
     if shapes:
         held_out = [shape for shape in shapes if shape.held_out]

@@ -72,7 +72,7 @@ def _held_out(groups: list[str]) -> set[str]:
 
 
 def load_cloud(shape: RealisticShape, cache: Path) -> np.ndarray:
-    """``[8192, 3]`` float32 area-weighted samples, from the cache when it has them.
+    """``[8192, 3]`` float32 area-weighted samples about their mean, cached by content.
 
     Raises:
         ShapeError: when the file can't be read.
@@ -84,7 +84,8 @@ def load_cloud(shape: RealisticShape, cache: Path) -> np.ndarray:
         return np.load(cached)
     mesh = read_mesh(data, shape.path.name)
     rng = np.random.default_rng(int(key[:8], 16))
-    cloud = sample_surface(mesh.vertices, mesh.faces, CLOUD_SIZE, rng).points.astype(np.float32)
+    points = sample_surface(mesh.vertices, mesh.faces, CLOUD_SIZE, rng).points
+    cloud = (points - points.mean(axis=0)).astype(np.float32)
     cache.mkdir(parents=True, exist_ok=True)
     np.save(cached, cloud)
     return cloud
@@ -122,7 +123,7 @@ class RealisticShapes:
                 continue
             try:
                 cloud = load_cloud(shape, cache)
-            except ShapeError as error:
+            except (ShapeError, OSError) as error:
                 self.skipped.append(f"{shape.name}: {error}")
                 continue
             clouds.append((cloud - cloud.mean(0)) / np.abs(cloud).max())

@@ -60,6 +60,7 @@ class Trainer:
         self.optimizer = torch.optim.Adam(self.encoder.parameters(), config.learning_rate)
         self.step = 0
         self.seconds = 0.0
+        self.earlier: list[dict[str, Any]] = []
 
     def train_step(self) -> dict[str, float]:
         """One optimiser step; the terms of the loss."""
@@ -124,6 +125,7 @@ class Trainer:
             "step": self.step,
             "seconds": self.seconds,
             "place": self._place(),
+            "earlier": self.earlier,
         }
 
     def _place(self) -> str:
@@ -143,6 +145,13 @@ class Trainer:
             self.realistic.rng.bit_generator.state = json.loads(state["realistic"])
             self.realistic.order = list(state.get("order", []))
         self.step, self.seconds = state["step"], state["seconds"]
+        self.earlier = state["earlier"]
+
+    def start_from(self, state: dict[str, Any]) -> None:
+        """Begin with the encoder of another run, whose settings are kept for the card."""
+        self.encoder.load_state_dict(state["encoder"])
+        own = {name: state[name] for name in ("config", "step", "seconds", "place")}
+        self.earlier = [*state["earlier"], own]
 
 
 def _rng_state(rng: np.random.Generator) -> str:
@@ -231,6 +240,7 @@ def main() -> None:
     parser.add_argument("--realistic", type=Path, help="folder of unlabelled real meshes")
     parser.add_argument("--out", type=Path, help="folder of the run (default runs/<config>)")
     parser.add_argument("--cache", type=Path, default=Path("cache"), help="for sampled clouds")
+    parser.add_argument("--start-from", type=Path, help="checkpoint of another run to go on from")
     parser.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     parser.add_argument("--threads", type=int, help="CPU threads (default: all)")
@@ -250,6 +260,8 @@ def main() -> None:
         print(f"{len(realistic)} real shapes to train on, {len(realistic.skipped)} unreadable")
     trainer = Trainer(config, realistic, arguments.device, arguments.compile)
     folder = arguments.out or Path("runs") / Path(arguments.config).stem
+    if arguments.start_from:
+        trainer.start_from(torch.load(arguments.start_from, map_location=arguments.device))
     if arguments.resume:
         state = torch.load(folder / "checkpoint.pt", map_location=arguments.device)
         trainer.restore(state)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from service.deform import blend, paper
 from service.deform.binding import Binding
+from service.deform.unfold import unfold
 from service.edited import Edited, Moved, write_edited
 from service.edits import Change
 from service.encode.model import Model
@@ -65,6 +66,11 @@ def edit(
     found = infer(upload, models, options)
     keep = _anchor(found.model, edit_options.keep)
     binding = _bind(found, edit_options.mode)
+    after = found.dimensions(binding.jacobian).after(edits)
+    if edit_options.mode == "blend":
+        changed = np.flatnonzero(after != found.parameters).tolist()
+        fit = found.best.estimate.parameters
+        binding = unfold(binding, found.vertices, found.mesh.faces, fit, changed)
     dimensions = found.dimensions(binding.jacobian)
     after = dimensions.after(edits)
     change = np.where(after == found.parameters, 0.0, (after - found.parameters) * found.scale)

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 SIGMA_FLOOR = 0.004
 """Least standard deviation claimed for a refined parameter: the repeat error of measuring real
 shapes by hand is of this size (share of the radius 0.6 frame's unit)."""
+DIVERGED = 1.5
+"""A refinement that ends this much farther from the mesh than it began has lost its way."""
 SIGMA_ENCODER = 0.04
 """Standard deviation claimed for the encoder alone, likewise."""
 
@@ -70,7 +72,7 @@ def estimate(
         return encoded
     fit = refine(model.template, parameters, translation, cloud, settings)
     fitted = surface_distance(model.template, fit.parameters, fit.translation, cloud)
-    if fitted > distance:
+    if fitted > DIVERGED * distance:
         return encoded
     return replace(
         encoded,

@@ -95,14 +95,15 @@ def _search(model: Model, samples: Samples, orientations: Sequence[Orientation])
 
     A first orientation that fits as well as shapes of the category usually do is taken at once.
     """
-    first = _roughly(model, samples, orientations[0])
+    first = roughly(model, samples, orientations[0])
     if len(orientations) == 1 or first.estimate.distance <= model.usual_distance:
         return [first]
     others = sorted(orientations[1:], key=lambda o: _encoded_distance(model, samples, o))
-    return [first, *(_roughly(model, samples, other) for other in others[:FINALISTS])]
+    return [first, *(roughly(model, samples, other) for other in others[:FINALISTS])]
 
 
-def _roughly(model: Model, samples: Samples, orientation: Orientation) -> Candidate:
+def roughly(model: Model, samples: Samples, orientation: Orientation) -> Candidate:
+    """A candidate refined just enough to be compared."""
     own = turned(samples, orientation)
     return Candidate(model, orientation, own, estimate(model, own, True, ROUGH, stride=3))
 

@@ -104,7 +104,8 @@ def test_the_card_says_what_the_model_is(
     assert [entry["name"] for entry in card["parameters"]] == list(stand.names)
     post = card["parameters"][2]
     assert (post["paper_name"], post["range"], post["unit"]) == ("post length", [0.3, 1.2], "m")
-    training = card["training"]
+    assert card["training"]["hours"] == 2.0
+    (training,) = card["training"]["runs"]
     assert (training["steps"], training["hours"]) == (10, 2.0)
     assert training["place"].startswith("CPU")
     assert training["config"]["seed"] == small_config.seed

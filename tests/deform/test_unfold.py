@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from service.deform.binding import Binding
+from service.deform.flips import count_flips
+from service.deform.unfold import unfold
+
+SIZE = 24
+
+
+def sheet() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """A flat grid of ``SIZE x SIZE`` unit cells."""
+    x, y = np.meshgrid(np.arange(SIZE + 1.0), np.arange(SIZE + 1.0), indexing="ij")
+    corner = np.arange((SIZE + 1) ** 2).reshape(SIZE + 1, SIZE + 1)
+    a, b, c, d = (
+        m.ravel() for m in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
+    )
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1), faces
+
+
+def bound(x_motion: NDArray[np.float64]) -> Binding:
+    """Vertices that move along x by so much a unit of the first of two parameters."""
+    jacobian = np.zeros((len(x_motion), 3, 2), np.float32)
+    jacobian[:, 0, 0] = x_motion
+    jacobian[:, 1, 1] = 1.0
+    none = np.zeros((len(x_motion), 3), np.float32)
+    return Binding(jacobian, none, np.zeros((3, 9, 2), np.float32))
+
+
+def flips(binding: Binding, factor: float) -> int:
+    vertices, faces = sheet()
+    change = np.array([factor - 1, 0.0])
+    after = vertices + binding.displace(change)
+    return count_flips(vertices, after, faces, binding.linear(change))
+
+
+def step(width: float) -> Binding:
+    """The right half follows the parameter by `width` cells a unit, the left half does not."""
+    vertices, _ = sheet()
+    return bound(np.where(vertices[:, 0] > SIZE / 2, width, 0.0))
+
+
+F = np.ones(2)
+
+
+@pytest.mark.parametrize("width", [4.0, 8.0])
+def test_a_fold_is_evened_out(width: float) -> None:
+    vertices, faces = sheet()
+    before = step(width)
+    assert flips(before, 0.7) > SIZE
+    after = unfold(before, vertices, faces, F, [0])
+    assert flips(after, 0.7) == 0
+    assert flips(after, 1.4) == 0
+
+
+def test_the_repair_stays_near_the_fold_and_in_its_column() -> None:
+    vertices, faces = sheet()
+    before = step(4.0)
+    after = unfold(before, vertices, faces, F, [0])
+    changed = (after.jacobian != before.jacobian).any(axis=1)
+    assert not changed[:, 1].any()
+    far = np.abs(vertices[:, 0] - SIZE / 2) > 10
+    assert changed[:, 0].any()
+    assert not changed[far].any()
+
+
+def test_what_does_not_fold_is_left_alone() -> None:
+    vertices, faces = sheet()
+    before = step(0.5)
+    assert unfold(before, vertices, faces, F, [0, 1]).jacobian is before.jacobian
+
+
+def test_only_the_named_parameters_are_looked_after() -> None:
+    vertices, faces = sheet()
+    before = step(4.0)
+    assert unfold(before, vertices, faces, F, [1]).jacobian is before.jacobian
+
+
+def test_vertices_at_one_place_keep_moving_as_one() -> None:
+    vertices, faces = sheet()
+    binding = step(4.0)
+    twice = np.concatenate([vertices, vertices])
+    faces = np.concatenate([faces[::2], faces[1::2] + len(vertices)])
+    double = replace(
+        binding,
+        jacobian=np.concatenate([binding.jacobian, binding.jacobian]),
+        gains=np.concatenate([binding.gains, binding.gains]),
+    )
+    after = unfold(double, twice, faces, F, [0])
+    used = np.intersect1d(
+        faces[faces < len(vertices)], faces[faces >= len(vertices)] - len(vertices)
+    )
+    assert (after.jacobian != double.jacobian).any()
+    np.testing.assert_array_equal(after.jacobian[used], after.jacobian[used + len(vertices)])
+
+
+def test_the_binding_that_came_is_not_changed() -> None:
+    vertices, faces = sheet()
+    before = step(4.0)
+    kept = before.jacobian.copy()
+    unfold(before, vertices, faces, F, [0])
+    np.testing.assert_array_equal(before.jacobian, kept)

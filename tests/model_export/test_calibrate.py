@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from model_export.calibrate import DRAWN, calibrate
+from model_export.realistic import find_shapes
+from service.encode.model import Model, load_models
+from service.mesh.surface import Samples, sample_surface
+
+MODELS = Path(__file__).parents[2] / "service" / "models"
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return load_models(MODELS)["chair"]
+
+
+def drawn(model: Model, count: int, noise: float = 0.0) -> list[Samples]:
+    """Box chairs of growing seats."""
+    rng = np.random.default_rng(0)
+    f = np.array([0.42, 0.04, 0.06, 0.45, 0.48, 0.40, 0.05, 0.05])
+    found = []
+    for index in range(count):
+        vertices = model.template.decode(f + np.eye(8)[4] * 0.02 * index)
+        vertices = vertices + noise * rng.standard_normal(vertices.shape)
+        found.append(sample_surface(vertices, model.template.faces, model.points, rng))
+    return found
+
+
+def test_without_real_shapes_distances_of_drawn_ones_are_stretched(model: Model) -> None:
+    card = calibrate(model, [], drawn(model, 3))
+    assert card["shapes"] == 0
+    assert 0 < card["limit_distance"] < DRAWN * 0.02
+    assert 0 < card["usual_distance"] < DRAWN * 0.02
+
+
+def test_worse_shapes_give_larger_limits(model: Model) -> None:
+    clean, rough = (calibrate(model, [], drawn(model, 3, noise)) for noise in (0.0, 0.02))
+    assert rough["limit_distance"] > 1.5 * clean["limit_distance"]
+    assert rough["usual_distance"] > 1.5 * clean["usual_distance"]
+
+
+def test_real_shapes_come_before_drawn_ones(
+    model: Model, tmp_path: Path, box_chair: trimesh.Trimesh
+) -> None:
+    for name, width in (("a", 1.0), ("b", 1.1)):
+        wider = box_chair.copy()
+        wider.apply_scale([width, 1.0, 1.0])
+        wider.export(tmp_path / f"{name}.ply")
+    card = calibrate(model, find_shapes(tmp_path), drawn(model, 2, 0.05))
+    assert card["shapes"] == 2
+    assert card["limit_distance"] < 0.02
