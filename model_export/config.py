@@ -74,6 +74,12 @@ def load_config(source: str, **overrides: Any) -> Config:
     unknown = set(entries) - {entry.name for entry in fields(Config)}
     if unknown:
         raise ValueError(f"{source}: no setting is named {sorted(unknown)[0]!r}")
+    return from_plain(entries)
+
+
+def from_plain(entries: dict[str, Any]) -> Config:
+    """A configuration from plain values, as files and checkpoints hold them."""
+    entries = dict(entries)
     nested = {"weights": Weights, "augmentation": Augmentation}
     for name, kind in nested.items():
         if isinstance(entries.get(name), dict):

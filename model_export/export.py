@@ -15,9 +15,11 @@ import numpy as np
 import torch
 
 from model_export.calibrate import calibrate
+from model_export.config import from_plain
 from model_export.evaluate import clouds_of, real_fits, synthetic_samples, synthetic_table
 from model_export.networks import PointEncoder, fold_batch_norm
 from model_export.realistic import RealisticShape, find_shapes
+from model_export.refit import refit
 from service.encode.model import Model, file_digest, golden_cloud
 from service.encode.session import EncoderSession
 from service.template.affine import AffineTemplate
@@ -140,12 +142,17 @@ def main() -> None:
     parser.add_argument("--cache", type=Path, default=Path("cache"), help="for sampled clouds")
     parser.add_argument("--out", type=Path, default=SHIPPED, help="models folder")
     parser.add_argument("--version", default="1.0.0", help="of the model")
+    parser.add_argument(
+        "--refit", type=int, default=4000, help="synthetic shapes to refit the last layer to"
+    )
     parser.add_argument("--count", type=int, default=1000, help="synthetic shapes to measure on")
     arguments = parser.parse_args()
     folder = arguments.run or Path("runs") / arguments.name
     state = torch.load(folder / "checkpoint.pt", map_location="cpu")
     template = load_template(state["config"]["template"])
     encoder = load_encoder(state)
+    if arguments.refit:
+        refit(encoder, template, from_plain(state["config"]), arguments.refit)
     arguments.out.mkdir(parents=True, exist_ok=True)
     source = Path(state["config"]["template"])
     if source.suffix in (".yaml", ".yml"):
@@ -157,6 +164,7 @@ def main() -> None:
     gap = check_onnx(encoder, path, random_clouds(template.points, 20) + clouds)
     print(f"onnxruntime and torch differ by {gap:.1e} over {20 + len(clouds)} clouds")
     card = build_card(template, state, path, arguments.version)
+    card["training"]["refit_shapes"] = arguments.refit
     card["data"] = describe_data(shapes)
     model = Model(card, template, path, threads=1)
     ordinary = [s for s in shapes if not s.held_out and s.info.get("core", True)]

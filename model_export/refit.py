@@ -1,0 +1,65 @@
+"""The last layer once more, in closed form, on synthetic shapes of the served size.
+
+Trained layers answer for clouds of all sizes and every augmentation at once, and a little too small
+or large for the clean, full-size clouds that are served.  With the layers before it fixed, the last
+one is linear in its weights: ridge regression towards the trained weights takes that bias out.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from model_export.config import Config
+from model_export.networks import PointEncoder
+from model_export.synthetic import Augmentation, SyntheticShapes
+from service.template.affine import AffineTemplate
+
+REFIT_SEED = 30_000_001
+CHUNK = 50
+RIDGE = 1e-3
+"""Pull towards the trained weights, relative to features of unit variance."""
+
+
+@torch.no_grad()
+def refit(encoder: PointEncoder, template: AffineTemplate, config: Config, count: int) -> None:
+    """Fit the last layer anew, in place, to ``count`` clean and half as many augmented shapes.
+
+    Args:
+        encoder: in evaluation mode.
+        template: the category.
+        config: that it was trained with.
+        count: of clean shapes; at least one chunk of 50.
+    """
+    sets = [(Augmentation.none(), count), (config.augmentation, count // 2)]
+    rows = []
+    for number, (augmentation, size) in enumerate(sets):
+        seed = REFIT_SEED + number + 10 * config.seed
+        shapes = SyntheticShapes(template, augmentation, seed, config.log_share)
+        rows += [_features(encoder, shapes) for _ in range(max(1, size // CHUNK))]
+    features, labels = (torch.cat(column).double() for column in zip(*rows, strict=True))
+    last = _last(encoder)
+    weights = torch.cat([last.weight, last.bias[:, None]], dim=1).double().T
+    residual = (labels - encoder.mean) / encoder.spread - features @ weights
+    gram = features.T @ features / len(features)
+    ridge = RIDGE * torch.eye(len(gram), dtype=gram.dtype)
+    weights = weights + torch.linalg.solve(gram + ridge, features.T @ residual / len(features))
+    last.weight.copy_(weights[:-1].T)
+    last.bias.copy_(weights[-1])
+
+
+def _last(encoder: PointEncoder) -> nn.Linear:
+    last = list(encoder.head)[-1]
+    assert isinstance(last, nn.Linear)
+    return last
+
+
+def _features(encoder: PointEncoder, shapes: SyntheticShapes) -> tuple[Tensor, Tensor]:
+    """What the last layer sees of a chunk of shapes, with a one for its bias; and the labels."""
+    batch = shapes.batch(CHUNK, shapes.template.points)
+    seen: list[Tensor] = []
+    hook = _last(encoder).register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]))
+    encoder(batch.points)
+    hook.remove()
+    features = torch.cat([seen[0], torch.ones(len(seen[0]), 1)], dim=1)
+    return features, torch.cat([batch.parameters, batch.translation], dim=1)
