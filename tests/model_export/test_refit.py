@@ -14,7 +14,12 @@ from service.template.affine import AffineTemplate
 
 def encoder_of(stand: AffineTemplate, config: Config) -> PointEncoder:
     torch.manual_seed(0)
-    return PointEncoder(*label_statistics(stand, config), head=(32, 16)).eval()
+    encoder = PointEncoder(*label_statistics(stand, config), head=(32, 16)).train()
+    shapes = SyntheticShapes(stand, Augmentation.none(), 4)
+    with torch.no_grad():
+        for _ in range(40):  # random layers, with the normalisation that training gives
+            encoder(shapes.batch(50, stand.points).points)
+    return encoder.eval()
 
 
 def error(encoder: PointEncoder, stand: AffineTemplate) -> float:
@@ -28,7 +33,7 @@ def test_the_error_on_clean_shapes_falls(stand: AffineTemplate, small_config: Co
     encoder = encoder_of(stand, small_config)
     before = error(encoder, stand)
     refit(encoder, stand, small_config, 400)
-    assert error(encoder, stand) < 0.8 * before
+    assert error(encoder, stand) < 0.7 * before
 
 
 def test_only_the_last_layer_changes(stand: AffineTemplate, small_config: Config) -> None:
