@@ -79,16 +79,38 @@ def save_sheet(
     columns: int = 5,
     size: float = 2.2,
     camera: Array | None = None,
+    aspect: float = 1.0,
+    same_scale: bool = False,
 ) -> None:
-    """Write the panels as one PNG, row by row."""
+    """Write the panels as one PNG, row by row.
+
+    Args:
+        panels: to draw.
+        path: of the PNG.
+        columns: panels a row.
+        size: height of a panel in inches.
+        camera: see `view`.
+        aspect: width of a panel over its height.
+        same_scale: draw all to one scale, on one floor.
+    """
     rows = -(-len(panels) // columns)
     figure, grid = pyplot.subplots(
-        rows, columns, figsize=(columns * size, rows * size), squeeze=False
+        rows,
+        columns,
+        figsize=(columns * size * aspect, rows * size),
+        squeeze=False,
+        layout="constrained",
     )
     for axes in grid.flat:
         axes.axis("off")
-    for axes, panel in zip(grid.flat, panels, strict=False):
+    drawn = list(zip(grid.flat, panels, strict=False))
+    for axes, panel in drawn:
         draw(axes, panel, view() if camera is None else camera)
-    figure.tight_layout(pad=0.6)
+    if same_scale:
+        height = max(np.ptp(axes.get_ylim()) for axes, _ in drawn)
+        for axes, _ in drawn:
+            floor, middle = axes.get_ylim()[0], sum(axes.get_xlim()) / 2
+            axes.set_ylim(floor, floor + height)
+            axes.set_xlim(middle - aspect * height / 2, middle + aspect * height / 2)
     figure.savefig(path, dpi=110)
     pyplot.close(figure)

@@ -25,6 +25,9 @@ Mask = NDArray[np.bool_]
 TOUCH = 0.012
 # A piece goes with the nearest group when the next is this much farther, by factor and length.
 CLEARLY = (1.25, 0.02)
+# A piece that makes up a part is left to its vertices when it runs on so far from it, as a root
+# mean square over and above what its vertices need.
+BEYOND = 0.06
 # Shares of the part's length under which a piece is carried, and over which it is stretched.
 CARRIED, STRETCHED = 0.4, 0.7
 # The same for a rod along its own axis, such as a spindle, which is held at both ends.
@@ -152,6 +155,11 @@ def _shares(
     # with what is clearly nearest.
     chosen = np.where(np.any(spans, axis=1)[:, None], spans, close)
     chosen = np.where(np.any(makes, axis=1)[:, None], makes, chosen)
+    # A post that runs on from a leg into the back makes up the leg, and still belongs to both.
+    free = np.sqrt(np.add.reduceat(to_group.min(axis=1) ** 2, starts) / counts)
+    alone = np.where(makes, cost, np.inf).min(axis=1)
+    beyond = np.isfinite(alone) & (alone > free + np.float32(BEYOND))
+    chosen |= beyond[:, None]
     shares = chosen.astype(np.float32)
     shares[chosen.sum(axis=1) > 1] = np.nan
     return shares

@@ -171,3 +171,17 @@ def test_any_triangles_are_bound_to_finite_moves(points, random):
     assert np.isfinite(binding.jacobian).all()
     assert np.isfinite(binding.linear(0.4 * PARAMETERS)).all()
     assert np.abs(binding.displace(0.4 * PARAMETERS)).max() < 2.0
+
+
+def test_a_post_that_runs_from_the_floor_to_the_top_follows_leg_and_back():
+    post = block((-0.21, -0.425, -0.225), (-0.17, 0.525, -0.185), cells=24)
+    vertices, faces = joined(post, template_mesh())
+    binding = bind(vertices, faces, chair(), PARAMETERS, ORIGIN)
+    count = len(post[0])
+    height = vertices[:count, 1] - ORIGIN[1]
+    lowered = binding.displace(change("back_height", -0.15))[:count, 1]
+    assert lowered[height > 0.5].max() < -0.12
+    assert np.abs(lowered[height < -0.1]).max() < 0.01
+    raised = binding.displace(change("leg_height", 0.1))[:count, 1]
+    assert raised[height < -0.4].max() < -0.09
+    assert np.abs(raised[height > 0.1]).max() < 0.01

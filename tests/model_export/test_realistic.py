@@ -82,8 +82,9 @@ def test_clouds_lie_on_the_mesh(listed: Path, tmp_path: Path) -> None:
     shape = find_shapes(listed)[5]
     cloud = load_cloud(shape, tmp_path / "cache")
     assert (cloud.shape, cloud.dtype) == ((CLOUD_SIZE, 3), np.float32)
-    np.testing.assert_allclose(cloud.min(axis=0), [0, 0, 0], atol=0.01)
-    np.testing.assert_allclose(cloud.max(axis=0), [7, 1, 0], atol=0.01)
+    # About its mean: a mesh far from its origin keeps its digits.
+    np.testing.assert_allclose(cloud.mean(axis=0), [0, 0, 0], atol=1e-5)
+    np.testing.assert_allclose(np.ptp(cloud, axis=0), [7, 1, 0], atol=0.02)
 
 
 def test_the_cache_is_read_back_and_keyed_by_content(listed: Path, tmp_path: Path) -> None:
