@@ -12,15 +12,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
-Faces = NDArray[np.int64]
-Mesh = tuple[Array, Faces]
+from model_export.primitives import (
+    Array,
+    Faces,
+    Mesh,
+    bar,
+    join,
+    lattice_surface,
+    slab,
+    tube,
+)
 
 NAMES = (
     "back_height", "back_thickness", "seat_thickness", "seat_depth",
@@ -91,96 +97,16 @@ def _style(rng: np.random.Generator) -> SimpleNamespace:
     )
 
 
-# --- pieces ---------------------------------------------------------------------------------------
-
-
-def _lattice_surface(occupied: NDArray[np.bool_]) -> tuple[Faces, Faces]:
-    """Boundary of the occupied cells: ``[n, 3]`` lattice nodes and ``[m, 3]`` triangles."""
-    filled = np.pad(occupied, 1)
-    corners: list[Faces] = []
-    for axis in range(3):
-        u, v = np.eye(3, dtype=np.int64)[[(axis + 1) % 3, (axis + 2) % 3]]
-        step = np.diff(filled.astype(np.int8), axis=axis)
-        for value, square in ((-1, [0 * u, u, u + v, v]), (1, [0 * u, v, u + v, u])):
-            cell = np.argwhere(step == value) - 1
-            cell[:, axis] += 1
-            corners.append(cell[:, None] + np.array(square))
-    quads = np.concatenate(corners)
-    nodes, index = np.unique(quads.reshape(-1, 3), axis=0, return_inverse=True)
-    index = index.reshape(-1, 4)
-    return nodes, np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
-
-
-@cache
-def _cube(cells: tuple[int, int, int], rim: int) -> tuple[Array, Array, Faces]:
-    """A rounded cube: inner coordinates in [-1, 1]^3, outward directions, triangles."""
-    nodes, faces = _lattice_surface(np.ones([count + 2 * rim for count in cells], bool))
-    count = np.array(cells)
-    inner = np.clip((nodes - rim) / count, 0.0, 1.0) * 2.0 - 1.0
-    outer = (np.minimum(nodes - rim, 0) + np.maximum(nodes - rim - count, 0)) / rim
-    outer = np.sin(outer * np.pi / 4) / np.sin(np.pi / 4)
-    return inner, outer / np.linalg.norm(outer, axis=1, keepdims=True), faces
-
-
-def _slab(center: ArrayLike, size: ArrayLike, fillet: float, density: int) -> Mesh:
-    """A box with rounded edges of a fixed radius; a cell for about each 8 cm / density."""
-    cells = (4 * density, 2 * density, 4 * density)
-    inner, outer, faces = _cube(cells, 3)
-    half = np.asarray(size) / 2.0
-    radius = np.minimum(fillet, 0.45 * half.min())
-    return np.asarray(center) + inner * (half - radius) + outer * radius, faces
-
-
-def _tube(path: Array, half: Array, sides: int, square: bool) -> Mesh:
-    """A closed tube along ``path [n, 3]`` with half sections ``half [n, 2]``, across the two axes
-    that the path mostly does not run along."""
-    run = int(np.abs(path[-1] - path[0]).argmax())
-    across = [axis for axis in range(3) if axis != run]
-    angle = (np.arange(sides) + 0.5) * 2.0 * np.pi / sides
-    section = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    if square:
-        section /= np.linalg.norm(section, ord=6, axis=1, keepdims=True)
-    rings = np.repeat(path[:, None], sides, axis=1)
-    rings[:, :, across] += section * half[:, None]
-    i = np.arange(sides)
-    j = (i + 1) % sides
-    start = np.arange(len(path) - 1)[:, None] * sides
-    a, b, c, d = (x.ravel() for x in (start + i, start + j, start + sides + j, start + sides + i))
-    end = len(path) * sides
-    last = end - sides
-    caps = [np.stack([0 * i + end, j, i], 1), np.stack([0 * i + end + 1, last + i, last + j], 1)]
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1), *caps])
-    forward = path[-1, run] > path[0, run]
-    if forward == (run == 1):
-        faces = faces[:, ::-1]
-    return np.concatenate([rings.reshape(-1, 3), path[[0, -1]]]), faces
-
-
-def _bar(start: ArrayLike, end: ArrayLike, half: ArrayLike, density: int, square: bool) -> Mesh:
-    s = np.linspace(0.0, 1.0, 5 * density + 1)[:, None]
-    path = np.asarray(start) * (1 - s) + np.asarray(end) * s
-    return _tube(path, np.broadcast_to(np.asarray(half), (len(s), 2)), 6 * density, square)
-
-
-def _join(pieces: list[Mesh]) -> Mesh:
-    offsets = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
-    faces = [face + offset for (_, face), offset in zip(pieces, offsets[:-1], strict=True)]
-    return np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
-
-
-# --- a chair of many pieces -----------------------------------------------------------------------
-
-
 def _assembled(p: SimpleNamespace, s: SimpleNamespace) -> Mesh:
     top = p.seat_thickness / 2
     seat = (p.seat_width, p.seat_thickness, p.seat_depth)
-    pieces = [_slab((0, 0, 0), seat, s.fillet, s.density)]
+    pieces = [slab((0, 0, 0), seat, s.fillet, s.density)]
     pieces += [_leg(p, s, x, z) for x in (-1, 1) for z in (-1, 1)]
     pieces += _back(p, s)
     if s.cushion:
         size = (p.seat_width - 0.03, s.cushion, p.seat_depth - 0.07)
         center = (0, top + s.cushion / 2, 0.02)
-        pieces.append(_slab(center, size, 0.02, s.density))
+        pieces.append(slab(center, size, 0.02, s.density))
     if s.apron:
         pieces += _rails(p, s, -top - s.apron / 2, (0.01, s.apron / 2), 0.0)
     if s.stretcher:
@@ -188,7 +114,7 @@ def _assembled(p: SimpleNamespace, s: SimpleNamespace) -> Mesh:
         pieces += _rails(p, s, y, (0.009, 0.009), 1 - s.stretcher)
     if s.arms:
         pieces += [piece for side in (-1, 1) for piece in _arm(p, s, side)]
-    return _join(pieces)
+    return join(pieces)
 
 
 def _leg_center(p: SimpleNamespace, s: SimpleNamespace, x: int, z: int, down: ArrayLike) -> Array:
@@ -218,7 +144,7 @@ def _leg(p: SimpleNamespace, s: SimpleNamespace, x: int, z: int) -> Mesh:
         up, post = _post(p, s, x)
         path = np.concatenate([up[::-1], path])
         half = np.concatenate([np.broadcast_to(post, (len(up), 2)), half])
-    return _tube(path, half, 6 * s.density, s.leg != "turned")
+    return tube(path, half, 6 * s.density, s.leg != "turned")
 
 
 def _post(p: SimpleNamespace, s: SimpleNamespace, x: int) -> tuple[Array, Array]:
@@ -240,7 +166,7 @@ def _back(p: SimpleNamespace, s: SimpleNamespace) -> Iterator[Mesh]:
     thick = p.back_thickness
     if s.back == "panel":
         center = (0, 0, 0)
-        flat, faces = _slab(center, (p.seat_width, 2.0, thick), s.fillet, 2 * s.density)
+        flat, faces = slab(center, (p.seat_width, 2.0, thick), s.fillet, 2 * s.density)
         # The panel follows the back's lean and bow.
         middle = _back_point(p, s, flat[:, 0], (flat[:, 1] + 1) / 2)
         middle[:, 2] += flat[:, 2]
@@ -249,7 +175,7 @@ def _back(p: SimpleNamespace, s: SimpleNamespace) -> Iterator[Mesh]:
         if not s.posts_are_legs:
             for x in (-1, 1):
                 path, half = _post(p, s, x)
-                yield _tube(path, np.broadcast_to(half, (len(path), 2)), 6 * s.density, True)
+                yield tube(path, np.broadcast_to(half, (len(path), 2)), 6 * s.density, True)
         yield _crossbar(p, s, 1.0, 0.03)
         if s.back == "slats":
             for up in (np.arange(s.slats) + 0.7) / (s.slats + 0.7):
@@ -259,12 +185,12 @@ def _back(p: SimpleNamespace, s: SimpleNamespace) -> Iterator[Mesh]:
             up = np.linspace(0.0, 1.0, 8 * s.density)
             for x in np.linspace(-span, span, s.spindles + 2)[1:-1]:
                 half = np.broadcast_to([0.007, 0.007], (len(up), 2))
-                yield _tube(_back_point(p, s, x, up), half, 4 * s.density, False)
+                yield tube(_back_point(p, s, x, up), half, 4 * s.density, False)
     if s.back_cushion:
         size = (p.seat_width - 0.05, p.back_height - 0.08, s.back_cushion)
         center = _back_point(p, s, 0.0, 0.5)
         center[2] += (thick + s.back_cushion) / 2
-        yield _slab(center, size, 0.02, s.density)
+        yield slab(center, size, 0.02, s.density)
 
 
 def _crossbar(p: SimpleNamespace, s: SimpleNamespace, up: float, half: float) -> Mesh:
@@ -273,7 +199,7 @@ def _crossbar(p: SimpleNamespace, s: SimpleNamespace, up: float, half: float) ->
     path = _back_point(p, s, x, up)
     path[:, 1] -= half
     section = np.broadcast_to([half, 0.4 * p.back_thickness], (len(x), 2))
-    return _tube(path, section, 6 * s.density, True)
+    return tube(path, section, 6 * s.density, True)
 
 
 def _rails(
@@ -285,9 +211,9 @@ def _rails(
     leg = {(x, z): _leg_center(p, s, x, z, down) for x in (-1, 1) for z in (-1, 1)}
     for side in (-1, 1):
         ends = leg[-1, side], leg[1, side]
-        yield _bar(*(np.array([e[0], y, e[2]]) for e in ends), (up, across), s.density, square)
+        yield bar(*(np.array([e[0], y, e[2]]) for e in ends), (up, across), s.density, square)
         ends = leg[side, -1], leg[side, 1]
-        yield _bar(*(np.array([e[0], y, e[2]]) for e in ends), (across, up), s.density, square)
+        yield bar(*(np.array([e[0], y, e[2]]) for e in ends), (across, up), s.density, square)
 
 
 def _arm(p: SimpleNamespace, s: SimpleNamespace, side: int) -> Iterator[Mesh]:
@@ -295,8 +221,8 @@ def _arm(p: SimpleNamespace, s: SimpleNamespace, side: int) -> Iterator[Mesh]:
     y = p.seat_thickness / 2 + s.arms
     front = p.seat_depth / 2 - 0.05
     rear = (p.back_thickness - p.seat_depth) / 2 - s.recline * s.arms / 0.5
-    yield _bar((x, y, rear), (x, y, front), (0.022, 0.014), s.density, True)
-    yield _bar((x, 0, front - 0.03), (x, y, front - 0.03), (0.013, 0.013), s.density, False)
+    yield bar((x, y, rear), (x, y, front), (0.022, 0.014), s.density, True)
+    yield bar((x, 0, front - 0.03), (x, y, front - 0.03), (0.013, 0.013), s.density, False)
 
 
 # --- a chair of one piece -------------------------------------------------------------------------
@@ -323,7 +249,7 @@ def _welded(p: SimpleNamespace, s: SimpleNamespace) -> Mesh:
     across = _columns(w, x_cells, [(lw, lw), (post, post), (post, post)])
     along = _columns(d, z_cells, [(ld, ld), (post, post), (p.back_thickness, post)])
     at = [np.repeat(np.arange(len(c)), c) for c in (x_cells, y_cells, z_cells)]
-    nodes, faces = _lattice_surface(_chair_cells(*np.meshgrid(*at, indexing="ij"), s))
+    nodes, faces = lattice_surface(_chair_cells(*np.meshgrid(*at, indexing="ij"), s))
     i, j, h = nodes.T
     corner = ((i <= k) | (i >= 9 * k)) & ((h <= k) | (h >= 9 * k))
     # Legs and rails, the seat down to its underside between them, the back from the seat's top.

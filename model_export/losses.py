@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from model_export.sampling import face_areas, sample_faces
 from model_export.synthetic import Batch
 from service.template.affine import AffineTemplate
 
@@ -104,20 +105,8 @@ class Losses:
         return there.square().sum(dim=2).mean() + back.square().sum(dim=2).mean()
 
     def _sample(self, vertices: Tensor, points: int) -> Tensor:
-        count = len(vertices)
-        a, b, c = (vertices[:, self.faces[:, corner]] for corner in range(3))
-        with torch.no_grad():
-            cumulative = torch.linalg.cross(b - a, c - a).norm(dim=2).cumsum(dim=1)
-            ticks = torch.rand(count, points, device=vertices.device) * cumulative[:, -1:]
-            face = torch.searchsorted(cumulative, ticks).clamp_(max=len(self.faces) - 1)
-        index = face[..., None].expand(-1, -1, 3)
-        root = torch.rand(count, points, 1, device=vertices.device).sqrt()
-        v = torch.rand(count, points, 1, device=vertices.device)
-        return (
-            (1 - root) * a.gather(1, index)
-            + root * (1 - v) * b.gather(1, index)
-            + root * v * c.gather(1, index)
-        )
+        weight = face_areas(vertices, self.faces).detach()
+        return sample_faces(vertices, self.faces, weight, points)
 
 
 def draw_edit(

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from model_export.sampling import face_areas, sample_faces
 from service.mesh.surface import RADIUS
 from service.template.affine import AffineTemplate
 
@@ -138,19 +139,8 @@ class SyntheticShapes:
         return torch.where(self.hidden & closed, 0.0, density)
 
     def _sample_points(self, vertices: Tensor, points: int) -> Tensor:
-        count = len(vertices)
-        a, b, c = (vertices[:, self.faces[:, corner]] for corner in range(3))
-        area = torch.linalg.cross(b - a, c - a).norm(dim=2)
-        cumulative = (area * self._density(count)).cumsum(dim=1)
-        ticks = self._rand(count, points) * cumulative[:, -1:]
-        face = torch.searchsorted(cumulative, ticks).clamp_(max=len(self.faces) - 1)
-        index = face[..., None].expand(-1, -1, 3)
-        root, v = self._rand(count, points, 1).sqrt(), self._rand(count, points, 1)
-        return (
-            (1 - root) * a.gather(1, index)
-            + root * (1 - v) * b.gather(1, index)
-            + root * v * c.gather(1, index)
-        )
+        weight = face_areas(vertices, self.faces) * self._density(len(vertices))
+        return sample_faces(vertices, self.faces, weight, points, self.generator)
 
     def _clutter(self, cloud: Tensor) -> Tensor:
         """Move a share of points onto a few random boxes inside the cloud's bounding box.
