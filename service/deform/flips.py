@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from service.deform.normals import face_crosses
+
 NEGLIGIBLE = 1e-4
 """Faces smaller than this share of the mean area have no direction worth counting."""
+STRETCH = 3.0
+"""A symmetric map whose stretches are within this factor of each other turns no normal by more
+than 30 degrees: asin((3 - 1) / (3 + 1))."""
 
 
 def flipped(
@@ -22,16 +27,35 @@ def flipped(
         faces: ``[F, 3]``.
         maps: ``[V, 3, 3]`` local linear maps of the edit.
     """
-    a, b, c = faces.T
-    origin = before[a]
-    sides = before[b] - origin, before[c] - origin
-    size = np.linalg.norm(np.cross(*sides), axis=1)
-    mean = (maps[a] + maps[b] + maps[c]) / 3.0
+    normal, turned = face_crosses(before, faces), face_crosses(after, faces)
+    squared = np.einsum("fi,fi->f", normal, normal)
+    counted = squared > (NEGLIGIBLE * np.sqrt(squared).mean()) ** 2
+    suspects = np.ones(len(faces), bool)
+    if _turns_little(maps):
+        # Nor has a face flipped whose own normal turned by less than the 60 degrees that remain.
+        cosine = np.einsum("fi,fi->f", normal, turned)
+        suspects = cosine < 0.5 * np.sqrt(squared * np.einsum("fi,fi->f", turned, turned))
+    rows = np.flatnonzero(suspects & counted)
+    corners = faces[rows]
+    mean = maps[corners].mean(axis=1)
+    origin = before[corners[:, 0]]
+    sides = (before[corners[:, 1]] - origin, before[corners[:, 2]] - origin)
     carried = np.cross(*(np.einsum("fij,fj->fi", mean, side) for side in sides))
-    origin = after[a]
-    normal = np.cross(after[b] - origin, after[c] - origin)
-    against = np.einsum("fi,fi->f", carried, normal) < 0.0
-    return against & (size > NEGLIGIBLE * size.mean())
+    folded = np.zeros(len(faces), bool)
+    folded[rows] = np.einsum("fi,fi->f", carried, turned[rows]) < 0.0
+    return folded
+
+
+def _turns_little(maps: NDArray[np.floating]) -> bool:
+    """Whether all maps are symmetric with stretches, by Gershgorin's bounds, within `STRETCH`."""
+    above, below = maps[:, [0, 0, 1], [1, 2, 2]], maps[:, [1, 2, 2], [0, 0, 1]]
+    if not np.array_equal(above, below):
+        return False
+    ab, ac, bc = np.abs(above).T
+    diagonal = maps[:, [0, 1, 2], [0, 1, 2]]
+    off = np.stack([ab + ac, ab + bc, ac + bc], axis=1)
+    low, high = (diagonal - off).min(axis=1), (diagonal + off).max(axis=1)
+    return bool((low > 0.0).all() and (high <= STRETCH * low).all())
 
 
 def count_flips(

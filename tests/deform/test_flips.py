@@ -88,3 +88,18 @@ def test_the_unit_of_the_mesh_makes_no_difference() -> None:
     maps = np.broadcast_to(np.eye(3), (len(VERTICES), 3, 3))
     for size in (1e-4, 1e4):
         assert count_flips(size * VERTICES, size * after, FACES, maps) == counted
+
+
+@pytest.mark.parametrize("stretch", [0.5, 1.0, 1.4, 3.5])
+def test_the_quick_look_at_stretches_agrees_with_the_whole_formula(stretch: float) -> None:
+    rng = np.random.default_rng(3)
+    before = rng.standard_normal((300, 3))
+    faces = rng.integers(0, 300, (500, 3))
+    maps = np.tile(np.diag([1.0, stretch, 1.0]), (300, 1, 1))
+    after = before * [1.0, stretch, 1.0] + 0.3 * rng.standard_normal((300, 3))
+    crosses = [
+        np.cross(v[faces[:, 1]] - v[faces[:, 0]], v[faces[:, 2]] - v[faces[:, 0]])
+        for v in (before * [1.0, stretch, 1.0], after)
+    ]
+    expected = (crosses[0] * crosses[1]).sum(axis=1) < 0
+    assert 10 < count_flips(before, after, faces, maps) == expected.sum()
