@@ -167,7 +167,7 @@ def test_the_description_names_every_parameter_and_dimension(folder: Path) -> No
     assert {n for n, e in entries.items() if e["derived"]} == set(model.template.derived)
     seat = entries["seat_thickness"]
     assert (seat["paper_name"], seat["group"], seat["unit"]) == ("seat height", "seat", "m")
-    assert (seat["range"], seat["typical"]) == ([0.01, 0.35], [0.02, 0.2])
+    assert (seat["range"], seat["typical"]) == ([0.002, 0.35], [0.02, 0.2])
     assert (seat["step"], entries["leg_height"]["step"]) == (0.001, 0.005)
     assert entries["total_height"]["paper_name"] is None
 
