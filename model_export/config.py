@@ -12,6 +12,9 @@ import yaml
 from model_export.losses import Weights
 from model_export.synthetic import Augmentation
 
+SHIPPED = Path(str(resources.files("service"))) / "models"
+"""The folder of the models that come with the service."""
+
 
 @dataclass(frozen=True)
 class Config:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from model_export.config import SHIPPED
 from model_export.pictures import BLUE, GREY, YELLOW, Panel, save_sheet
 from model_export.realistic import RealisticShape, find_shapes
 from service.edits import Change
@@ -69,8 +70,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=20, help="held-out shapes to draw")
     parser.add_argument("--shape", help="draw this shape's edits instead of fits")
     arguments = parser.parse_args()
-    shipped = Path(__file__).parent.parent / "service" / "models"
-    model = load_models(arguments.models or shipped)[arguments.name]
+    model = load_models(arguments.models or SHIPPED)[arguments.name]
     shapes = find_shapes(arguments.realistic)
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     if arguments.shape:

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
+from model_export.config import SHIPPED
 from model_export.metrics import Recovery, recovery
 from model_export.realistic import CLOUD_SIZE, RealisticShape, find_shapes, load_cloud
 from model_export.synthetic import Augmentation, SyntheticShapes
@@ -170,8 +171,7 @@ def main() -> None:
     parser.add_argument("--truth", type=Path, help="hand measurements of some of them")
     parser.add_argument("--count", type=int, default=1000, help="synthetic shapes")
     arguments = parser.parse_args()
-    shipped = Path(__file__).parent.parent / "service" / "models"
-    model = load_models(arguments.models or shipped)[arguments.name]
+    model = load_models(arguments.models or SHIPPED)[arguments.name]
     torch.set_num_threads(1)
     if arguments.count:
         print(json.dumps(synthetic_table(model, arguments.count), indent=2))

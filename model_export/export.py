@@ -15,7 +15,7 @@ import numpy as np
 import torch
 
 from model_export.calibrate import calibrate
-from model_export.config import from_plain
+from model_export.config import SHIPPED, from_plain
 from model_export.evaluate import clouds_of, real_fits, synthetic_samples, synthetic_table
 from model_export.networks import PointEncoder, fold_batch_norm
 from model_export.realistic import RealisticShape, find_shapes
@@ -27,7 +27,6 @@ from service.template.loader import load_template
 
 TOLERANCE = 1e-4
 PAPER = "Wei et al., Learning to Infer Semantic Parameters for 3D Shape Editing, 3DV 2020"
-SHIPPED = Path(__file__).parent.parent / "service" / "models"
 
 
 def load_encoder(state: dict[str, Any]) -> PointEncoder:

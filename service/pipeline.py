@@ -21,12 +21,12 @@ from service.mesh.frame import AUTO, orientations
 from service.mesh.meshfile import MeshFile
 from service.mesh.surface import Samples, sample_surface
 from service.requests import (
-    METRIC,
     MODES,
     UNITS,
     EditOptions,
     InferOptions,
     Upload,
+    file_unit,
     require_units,
 )
 
@@ -46,7 +46,7 @@ def infer(upload: Upload, models: Mapping[str, Model], options: InferOptions) ->
     samples = {points: _sample(mesh, points) for points in {model.points for model in chosen}}
     candidates = recognise(chosen, samples, ways, options.refine)
     # glTF is in metres whatever the client's unit; other files are in the unit it names.
-    unit_scale = 1.0 / UNITS[options.units] if mesh.format in METRIC else 1.0
+    unit_scale = file_unit(mesh.format, options.units) / UNITS[options.units]
     return Inference(upload, mesh, candidates, options.units, unit_scale)
 
 
