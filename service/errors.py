@@ -4,8 +4,10 @@
     |- UnsupportedFormat    not a format we read, or a feature we can't carry through
     |- InvalidMesh          the file is broken or holds no usable surface
     |- TooLarge             over a limit on bytes, vertices or faces
+    |- TooComplex           more work than one request may make
     |- InvalidRequest       an option, parameter name or edit value that makes no sense
     |- NotFound             no such category or stored mesh
+    |- Overloaded           others' work left no time for this; later it may
     `- ModelFault           an installed model that can't be trusted
 
 Each error carries a stable `code` (snake_case, part of the API), a `detail` that names what was
@@ -37,12 +39,20 @@ class TooLarge(ShapeError):
     """The upload is over a limit."""
 
 
+class TooComplex(ShapeError):
+    """The upload makes more work than one request may."""
+
+
 class InvalidRequest(ShapeError):
     """An option, a name or a value of the request makes no sense."""
 
 
 class NotFound(ShapeError):
     """There is no such thing here."""
+
+
+class Overloaded(ShapeError):
+    """The service is too busy; the same request may pass later."""
 
 
 class ModelFault(ShapeError):

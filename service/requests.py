@@ -43,11 +43,15 @@ class InferOptions:
 
 @dataclass(frozen=True)
 class EditOptions:
-    """How an edit is carried out; `keep` and `format` default to the category's and the file's."""
+    """How an edit is carried out; `keep` and `format` default to the category's and the file's.
+
+    `strict` refuses an edit that can't be had to the letter; otherwise the nearest is made.
+    """
 
     mode: str = "blend"
     keep: str | None = None
     format: str | None = None
+    strict: bool = False
 
 
 def require_units(units: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -43,14 +43,6 @@ class Span:
         """``[count, width]`` view of the elements in the buffer's `content`."""
         strides = (self.stride, dtype.itemsize)
         return np.ndarray((self.count, width), dtype, content, self.offset, strides)
-
-    def overlaps(self, other: Span) -> bool:
-        """Whether the two may share bytes (interleaved arrays count as if they did)."""
-        return (
-            self.buffer == other.buffer
-            and self.offset < other.offset + other.stride * other.count
-            and other.offset < self.offset + self.stride * self.count
-        )
 
 
 @dataclass(frozen=True)
@@ -134,6 +126,32 @@ def read_accessor(document: Document, buffers: Bytes, index: Any) -> Accessor:
     sparse = _sparse(document, buffers, entry, count, size) if "sparse" in entry else None
     normalized = entry.get("normalized") is True and dtype.kind != "f"
     return Accessor(index, entry, dtype, width, count, normalized, span, sparse)
+
+
+def sharing_bytes(accessors: Iterable[Accessor]) -> set[int]:
+    """Numbers of the accessors that may lie in bytes of another, interleaved ones among them."""
+    spans = sorted(
+        (
+            s.buffer,
+            s.offset,
+            s.offset + s.stride * (s.count - 1) + a.dtype.itemsize * a.width,
+            a.index,
+        )
+        for a in accessors
+        for s in a.spans
+    )
+    found: set[int] = set()
+    cluster: list[int] = []
+    last, end = -1, 0
+    for buffer, start, stop, index in spans:
+        if buffer != last or start >= end:
+            cluster = []
+            last, end = buffer, stop
+        cluster.append(index)
+        end = max(end, stop)
+        if len(cluster) > 1:
+            found.update(cluster[-2:])
+    return found
 
 
 def _span(document: Document, buffers: Bytes, part: Object, count: int, size: int) -> Span:

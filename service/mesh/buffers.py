@@ -1,9 +1,13 @@
-"""The buffers of a glTF asset: the GLB's binary chunk and data URIs.  Nothing is ever fetched."""
+"""The buffers of a glTF asset: the GLB's binary chunk, data URIs, and files of the same archive.
+
+Nothing is ever fetched, and nothing read from disk.
+"""
 
 from __future__ import annotations
 
 import base64
 import binascii
+from typing import Protocol
 
 from service.mesh.document import Document
 from service.mesh.faults import quoted, unsupported
@@ -11,13 +15,30 @@ from service.mesh.faults import quoted, unsupported
 ALIGNMENT = 4
 
 
-class Buffers:
-    """Bytes by buffer index; `chunk` is the GLB's binary chunk, where there is one."""
+class Files(Protocol):
+    """The files that came with an asset."""
 
-    def __init__(self, document: Document, chunk: memoryview | None = None) -> None:
+    def locate(self, uri: str) -> str:
+        """The name of the file that `uri` means; ShapeError if there is none."""
+
+    def read(self, name: str) -> bytes:
+        """The content of a located file."""
+
+
+class Buffers:
+    """Bytes by buffer index.
+
+    `chunk` is the GLB's binary chunk, where there is one; `files` what came with the asset.
+    """
+
+    def __init__(
+        self, document: Document, chunk: memoryview | None = None, files: Files | None = None
+    ) -> None:
         self._document = document
         self._chunk = chunk
+        self._files = files
         self._read: dict[int, memoryview] = {}
+        self._located: dict[int, str] = {}
 
     def __getitem__(self, index: int) -> memoryview:
         """The bytes of one buffer; UnsupportedFormat ``external_buffers`` if it is elsewhere."""
@@ -28,6 +49,15 @@ class Buffers:
     def in_chunk(self, index: int) -> bool:
         """Whether buffer `index` is the GLB's binary chunk."""
         return index == 0 and "uri" not in self._document.entry("buffers", 0)
+
+    def file(self, index: int) -> str | None:
+        """The name of the file that a buffer that was read is in, if it is in one."""
+        return self._located.get(index)
+
+    def rewritten(self, index: int, content: bytes | bytearray) -> bytes:
+        """That file with another `content` of the buffer; what stands behind it stays."""
+        assert self._files is not None
+        return bytes(content) + self._files.read(self._located[index])[len(content) :]
 
     def _load(self, index: int) -> memoryview:
         entry = self._document.entry("buffers", index)
@@ -42,15 +72,28 @@ class Buffers:
             raise self._document.wrong(f"buffers[{index}] has {len(content)} of its {length} bytes")
         return content[:length]
 
+    def _beside(self, index: int, uri: str) -> bytes:
+        if self._files is None:
+            raise unsupported(
+                "external_buffers",
+                f"The geometry is in another file, {quoted(uri)}",
+                "Upload a zip of the .gltf and its files, or a GLB",
+            )
+        name = self._files.locate(uri)
+        if name in self._located.values():
+            raise unsupported(
+                "shared_buffer_file",
+                f"Two buffers of the glTF are in one file, {quoted(name)}",
+                "Export it with one buffer, or as GLB",
+            )
+        self._located[index] = name
+        return self._files.read(name)
+
     def _decode(self, index: int, uri: object) -> bytes:
         if not isinstance(uri, str):
             raise self._document.wrong(f"buffers[{index}] has no uri")
         if not uri.startswith("data:"):
-            raise unsupported(
-                "external_buffers",
-                f"The geometry is in another file, {quoted(uri)}",
-                "Upload a GLB, or embed the buffers in the glTF as data URIs",
-            )
+            return self._beside(index, uri)
         head, _, payload = uri.partition(",")
         if not head.endswith(";base64"):
             raise self._document.wrong(f"the data URI of buffers[{index}] is not base64")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.mesh import limits
 from service.mesh.faults import malformed
 from service.mesh.polygons import Indices
 from service.mesh.textlines import SPACE, Bytes, TextLines, numbers
@@ -27,6 +28,7 @@ class Corners:
         self._lines, at = lines.beginning(b"f")
         tokens = lines.tokens(self._lines, at)
         self.counts: Indices = tokens.counts
+        limits.check_faces(int(np.maximum(self.counts - 2, 0).sum()))
         self._fields: dict[int, NDArray[Any]] = uniform_fields(tokens.text, tokens.edges)
         if not self._fields:
             self._fields = {

@@ -17,9 +17,9 @@ from service.mesh.obj import ObjFile
 from service.mesh.off import OffFile
 from service.mesh.ply import PlyFile
 from service.mesh.stl import StlFile, is_ascii, is_binary
+from service.mesh.zipped import ZippedFile
 
-Reader = type[GltfFile] | type[ObjFile] | type[PlyFile] | type[StlFile] | type[OffFile]
-READERS: dict[str, Reader] = {
+READERS: dict[str, type[MeshFile]] = {
     "glb": GlbFile,
     "gltf": GltfFile,
     "obj": ObjFile,
@@ -27,6 +27,7 @@ READERS: dict[str, Reader] = {
     "stl": StlFile,
     "off": OffFile,
 }
+ZIP = "zip"
 MEDIA_TYPES = {
     "model/gltf-binary": "glb",
     "model/gltf+json": "gltf",
@@ -40,6 +41,8 @@ MEDIA_TYPES = {
     "model/x.stl-binary": "stl",
     "model/vnd.off": "off",
     "model/off": "off",
+    "application/zip": ZIP,
+    "application/x-zip-compressed": ZIP,
 }
 OFF_START = re.compile(rb"\s*(ST)?C?N?4?n?OFF\b")
 JSON_START = re.compile(rb"(\xef\xbb\xbf)?\s*\{")
@@ -55,7 +58,8 @@ def read_mesh(data: bytes, name: str | None = None, content_type: str | None = N
 
     Args:
         data: the file.
-        name: its name; the suffix, where it is a known one, tells the format.
+        name: its name; the suffix, where it is a known one, tells the format.  A zip is read as
+            the one mesh in it.
         content_type: its media type, which tells where the name does not.  The first bytes tell
             where neither does.
 
@@ -68,7 +72,7 @@ def read_mesh(data: bytes, name: str | None = None, content_type: str | None = N
     try:
         # Numbers may overflow on the way; `check` finds what became of them.
         with np.errstate(all="ignore"):
-            mesh: MeshFile = READERS[format](data)
+            mesh = ZippedFile(data, READERS) if format == ZIP else READERS[format](data)
             check(mesh)
     except ShapeError:
         raise
@@ -81,7 +85,7 @@ def read_mesh(data: bytes, name: str | None = None, content_type: str | None = N
 def detect(data: bytes, name: str | None, content_type: str | None) -> str:
     """The format's name; UnsupportedFormat ``unsupported_format`` when there is none."""
     suffix = PurePath(name or "").suffix.lower().removeprefix(".")
-    if suffix in READERS:
+    if suffix in (*READERS, ZIP):
         return suffix
     media_type = (content_type or "").partition(";")[0].strip().lower()
     if media_type in MEDIA_TYPES:
@@ -92,7 +96,8 @@ def detect(data: bytes, name: str | None, content_type: str | None) -> str:
             "unsupported_format",
             f"The file {quoted(name or '')} of type {quoted(content_type or '')} is of no known "
             "mesh format",
-            f"Upload one of {', '.join(READERS)}",
+            f"Upload one of {', '.join(READERS)}, or a zip with one of them; Blender and most "
+            "other tools export GLB",
         )
     return found
 
@@ -101,6 +106,8 @@ def _sniff(data: bytes) -> str | None:
     head = data[:SNIFFED]
     if head.startswith(b"glTF"):
         return "glb"
+    if head.startswith((b"PK\3\4", b"PK\5\6")):
+        return ZIP
     if re.match(rb"ply\s", head):
         return "ply"
     if OFF_START.match(head):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
+from service.mesh import limits
 from service.mesh.buffers import Buffers
 from service.mesh.document import Document
 from service.mesh.faults import malformed, unsupported
@@ -42,7 +43,7 @@ class GlbFile(GltfFile):
         chunk = None
         if others and others[0].kind == BIN:
             chunk = memoryview(self.data)[others[0].start : others[0].end]
-        return document, Buffers(document, chunk)
+        return document, Buffers(document, chunk, self._files)
 
     def _pack(self, text: str, chunk: bytes | bytearray | None) -> bytes:
         first, *others = self._chunks
@@ -86,6 +87,7 @@ def read_chunks(data: bytes) -> list[Chunk]:
         if at > length:
             raise malformed("glb", f"its chunk at byte {start - CHUNK.size} is cut short")
         chunks.append(Chunk(kind, start, at))
+        limits.check_parts(len(chunks))
     if not chunks:
         raise malformed("glb", "it holds no chunks")
     return chunks

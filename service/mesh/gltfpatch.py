@@ -14,14 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.mesh.accessors import FLOAT, Accessor, Stored, Values
-from service.mesh.bounds import bounds
+from service import deadline
+from service.mesh.accessors import FLOAT, Accessor, Stored, Values, sharing_bytes
+from service.mesh.bounds import bounds, same_bound
 from service.mesh.buffers import Buffers, Draft
 from service.mesh.document import Document, Object
 from service.mesh.geometry import NORMAL, POSITION, Geometry, Use
 from service.mesh.jsontext import END, Path
 from service.mesh.meshcopies import Repointing, pinned_accessors
 from service.mesh.moves import Moves
+from service.mesh.occupied import Occupied, element_size
 from service.mesh.polygons import Indices
 
 VERTEX_DATA = 34962
@@ -78,8 +80,9 @@ class Patch:
         self._buffers = buffers
         self._geometry = geometry
         self._added: dict[str, list[Object]] = defaultdict(list)
-        # What each accessor holds from now on.
+        # What each accessor holds from now on, of those that share bytes with another.
         self._expected: dict[int, Stored] = {}
+        self._shared = sharing_bytes(geometry.accessors.values())
 
     def apply(self, change: Moves) -> None:
         """Write what moved."""
@@ -87,8 +90,10 @@ class Patch:
         for use in self._geometry.uses:
             sharing[use.accessor].append(use)
         pinned = pinned_accessors(self._document)
+        self._occupied = Occupied(self._document, self._buffers, pinned - sharing.keys())
         repointing = Repointing(self._document, self._geometry.uses)
         for index, uses in sharing.items():
+            deadline.check()
             accessor = self._geometry.accessors[index]
             old = accessor.decode(accessor.stored(self._buffers))
             contents = self._contents(old, uses, change)
@@ -128,14 +133,17 @@ class Patch:
         return sorted(contents, key=lambda content: not content.stays)
 
     def _content(self, old: Values, attribute: str, number: int, change: Moves) -> Content:
-        block = self._geometry.blocks[number]
+        block, morph = self._geometry.blocks[number], self._geometry.blocks[number].morph
         part = slice(block.start, block.start + block.count)
         mask = (change.moved if attribute == POSITION else change.turned)[part]
         rows: Rows = slice(None) if mask.all() else np.flatnonzero(mask)
         placement, local = block.placement.at(rows), picked(old, rows)[:, :3]
         if attribute == POSITION:
             before, after = self._geometry.vertices[part], change.vertices[part]
-            values = placement.shifted(local, picked(before, rows), picked(after, rows))
+            shown = local if morph is None else local + picked(morph, rows)
+            values = placement.shifted(shown, picked(before, rows), picked(after, rows))
+            if morph is not None:
+                values = values - picked(morph, rows)
         elif attribute == NORMAL:
             values = placement.turn_normals(local, picked(change.linear[part], rows))
         else:
@@ -145,7 +153,8 @@ class Patch:
     def _keep(self, accessor: Accessor, old: Values, content: Content) -> None:
         """Let `accessor` hold `content`, in place if that can be."""
         if content.stays:
-            self._expected[accessor.index] = accessor.stored(self._buffers)
+            if accessor.index in self._shared:
+                self._expected[accessor.index] = accessor.stored(self._buffers)
             return
         values = content.values
         if accessor.width > values.shape[1]:
@@ -156,10 +165,15 @@ class Patch:
             self._relocate(accessor, content.full(old))
             return
         target[rows] = stored
-        after = accessor.stored(self.draft).copy()
-        self._expected[accessor.index] = after
+        after = accessor.stored(self.draft)
+        if accessor.index in self._shared:
+            self._expected[accessor.index] = after.copy()
+        if "min" not in accessor.entry and "max" not in accessor.entry:
+            return
         for name, bound in zip(("min", "max"), bounds(after), strict=True):
-            if name in accessor.entry and not same_bound(accessor.entry[name], bound):
+            said = accessor.entry.get(name)
+            # Of normals that are not numbers there are no bounds.
+            if said is not None and np.isfinite(bound).all() and not same_bound(said, bound):
                 self.edits["accessors", accessor.index, name] = bound.tolist()
 
     def _target(self, accessor: Accessor, rows: Rows) -> tuple[Stored | None, Rows]:
@@ -173,6 +187,8 @@ class Patch:
         elif accessor.span is not None:
             span = accessor.span
         else:
+            return None, rows
+        if self._occupied.meets(span, element_size(accessor)):
             return None, rows
         content = self.draft.writable(span.buffer)
         return span.array(content, accessor.dtype, accessor.width), rows
@@ -205,7 +221,7 @@ class Patch:
             view["byteStride"] = padded.shape[1]
         entry["bufferView"] = self._add("bufferViews", view | {"target": VERTEX_DATA})
         for name, bound in zip(("min", "max"), bounds(stored), strict=True):
-            if name in entry:
+            if name in entry and np.isfinite(bound).all():
                 entry[name] = bound.tolist()
         return entry
 
@@ -226,13 +242,3 @@ class Patch:
 def picked(array: NDArray[Any], rows: Rows) -> NDArray[Any]:
     """Some rows of an array; a view where they are a slice."""
     return array[rows] if isinstance(rows, slice) else np.take(array, rows, axis=0)
-
-
-def same_bound(text: Any, bound: Stored) -> bool:
-    """Whether a bound in the JSON says what the stored values are."""
-    if not isinstance(text, list) or len(text) != len(bound):
-        return False
-    return all(
-        isinstance(value, int | float) and bound.dtype.type(value) == stored
-        for value, stored in zip(text, bound, strict=True)
-    )

@@ -11,6 +11,8 @@ Path = tuple[str | int, ...]
 
 # White space, and the byte order mark that may begin the text.
 BLANK = re.compile("[ \t\r\n\ufeff]*")
+# Half a pair, which JSON may hold as an escape and UTF-8 can't hold at all.
+SURROGATE = re.compile("[\ud800-\udfff]")
 # Stands for the place behind an array's last item.
 END = -1
 
@@ -55,7 +57,10 @@ class Leaf:
 
 def dump(value: object) -> str:
     """Compact JSON."""
-    return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+    if text.isascii() or not SURROGATE.search(text):
+        return text
+    return json.dumps(value, separators=(",", ":"))
 
 
 def _skip(text: str, at: int) -> int:

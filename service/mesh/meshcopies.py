@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
@@ -51,10 +50,12 @@ class Repointing:
         return edits
 
     def _copy(self, mesh: int, assignment: Assignment) -> Object:
-        result = copy.deepcopy(self._document.entry("meshes", mesh))
+        result = dict(self._document.entry("meshes", mesh))
+        primitives = [dict(item) for item in result["primitives"]]
         for (primitive, attribute), accessor in assignment.items():
-            result["primitives"][primitive]["attributes"][attribute] = accessor
-        return result
+            own = primitives[primitive]
+            own["attributes"] = own["attributes"] | {attribute: accessor}
+        return result | {"primitives": primitives}
 
 
 def pinned_accessors(document: Document) -> set[int]:

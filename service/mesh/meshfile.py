@@ -16,7 +16,7 @@ class MeshFile(ABC):
     """An uploaded file: its geometry in world space, and the way back into its own bytes.
 
     Attributes:
-        format: lower-case format name, e.g. ``"glb"``; also the file suffix.
+        format: lower-case name of the mesh's format, e.g. ``"glb"``.
         media_type: what an HTTP answer calls it.
         data: the file exactly as it came.
         vertices: ``[V, 3]`` world-space positions, in the file's own frame and units.
@@ -28,6 +28,19 @@ class MeshFile(ABC):
     data: bytes
     vertices: Vertices
     faces: Faces
+
+    @abstractmethod
+    def __init__(self, data: bytes) -> None: ...
+
+    @property
+    def suffix(self) -> str:
+        """What the file's name ends in; the format but for an archive."""
+        return self.format
+
+    @property
+    def visible(self) -> Faces:
+        """``[G, 3]`` those of `faces` that are there to be seen, not for collisions."""
+        return self.faces
 
     @abstractmethod
     def write(self, vertices: Vertices, linear: Linear) -> bytes:
@@ -42,3 +55,10 @@ class MeshFile(ABC):
             The new file.  Values whose vertex did not move keep their bytes; when none moved the
             answer is ``self.data`` itself.
         """
+
+    def write_files(self, vertices: Vertices, linear: Linear) -> dict[str, bytes]:
+        """As `write`, with the new content of other files that the mesh lies in, by their names.
+
+        The name of the mesh's own file is empty.
+        """
+        return {"": self.write(vertices, linear)}

@@ -14,6 +14,8 @@ from service.mesh.meshfile import Linear, Vertices
 LARGEST_COORDINATE = 1e37
 # Rows turned at a time: the nine columns of a block stay in the processor's cache.
 BLOCK = 8192
+# Directions shorter than this have none.
+TINY = float(np.finfo(np.float64).tiny)
 
 
 # Normals in a file may be anything, infinite or not a number too: those stay as they are.
@@ -69,9 +71,18 @@ def compare(old: Vertices, vertices: Vertices, linear: Linear) -> Moves:
             "Use edits nearer to the parameters' typical ranges.",
         )
     moved = any_of_rows(vertices != old)
-    flat = linear.reshape(-1, 9)
-    turned = any_of_rows(flat != np.eye(3, dtype=linear.dtype).reshape(9))
-    return Moves(vertices, linear, moved, turned)
+    return Moves(vertices, linear, moved, _turned(linear))
+
+
+def _turned(linear: Linear) -> NDArray[np.bool_]:
+    """``[V]`` which maps are not the identity, compared in blocks without a break in them."""
+    identities = np.tile(np.eye(3, dtype=linear.dtype).reshape(9), min(BLOCK, len(linear)))
+    result = np.empty(len(linear), bool)
+    for start in range(0, len(linear), BLOCK):
+        flat = linear[start : start + BLOCK].reshape(-1)
+        differs = flat != identities[: len(flat)]
+        result[start : start + BLOCK] = any_of_rows(differs.reshape(-1, 9))
+    return result
 
 
 def any_of_rows(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -95,16 +106,18 @@ def turn_normals(normals: NDArray[np.float64], linear: Linear) -> NDArray[np.flo
             linear[part].transpose(1, 2, 0), dtype=np.float64
         )
         x, y, z = np.ascontiguousarray(normals[part].T)
-        cofactors = e * i - f * h, f * g - d * i, d * h - e * g
-        sign = np.where(a * cofactors[0] + b * cofactors[1] + c * cofactors[2] < 0, -1.0, 1.0)
-        turned = np.stack(
-            [
-                cofactors[0] * x + cofactors[1] * y + cofactors[2] * z,
-                (c * h - b * i) * x + (a * i - c * g) * y + (b * g - a * h) * z,
-                (b * f - c * e) * x + (c * d - a * f) * y + (a * e - b * d) * z,
-            ]
-        )
-        result[part] = unit((turned * sign).T, normals[part])
+        p, q, r = e * i - f * h, f * g - d * i, d * h - e * g
+        u = p * x + q * y + r * z
+        v = (c * h - b * i) * x + (a * i - c * g) * y + (b * g - a * h) * z
+        w = (b * f - c * e) * x + (c * d - a * f) * y + (a * e - b * d) * z
+        length = np.sqrt(u * u + v * v + w * w)
+        usable = (length > TINY) & (length < np.inf)
+        sign = np.where(a * p + b * q + c * r < 0, -1.0, 1.0)
+        scale = sign / np.where(usable, length, 1.0)
+        for column, turned in enumerate((u, v, w)):
+            np.multiply(turned, scale, out=result[part, column])
+        if not usable.all():
+            result[part][~usable] = normals[part][~usable]
     return result
 
 
@@ -117,6 +130,6 @@ def unit(directions: NDArray[np.float64], otherwise: NDArray[np.float64]) -> NDA
     """``[N, 3]`` directions scaled to length 1; others where that can't be."""
     x, y, z = directions.T
     length = np.sqrt(x * x + y * y + z * z)[:, None]
-    usable = (length > np.finfo(np.float64).tiny) & (length < np.inf)
+    usable = (length > TINY) & (length < np.inf)
     result: NDArray[np.float64] = directions / np.where(usable, length, 1.0)
     return result if usable.all() else np.where(usable, result, otherwise)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from service.mesh import moves
 from service.mesh.corners import NORMAL, POSITION, Corners
-from service.mesh.faults import face_out_of_range, malformed
+from service.mesh.faults import face_out_of_range, malformed, unsupported
 from service.mesh.meshfile import Linear, MeshFile, Vertices
 from service.mesh.polygons import fan
 from service.mesh.replacement import rewrite
@@ -29,6 +29,7 @@ class ObjFile(MeshFile):
         """Read `data`; InvalidMesh when that can't be."""
         self.data = data
         lines = TextLines("obj", data, continued=True)
+        _refuse_free_form(lines)
         self._positions = Triples(lines, b"v")
         self._normals = Triples(lines, b"vn")
         corners = Corners(lines)
@@ -71,3 +72,13 @@ class ObjFile(MeshFile):
         sums = [np.bincount(normal, mapped[:, i], len(turned)) for i in range(3)]
         total: Vertices = np.stack(sums, axis=1).astype(np.float64)
         return turned, moves.unit(total, values)
+
+
+def _refuse_free_form(lines: TextLines) -> None:
+    for keyword in (b"surf", b"curv", b"curv2"):
+        if keyword in lines.data and len(lines.beginning(keyword)[0]):
+            raise unsupported(
+                "free_form",
+                f"The file has free-form curves or surfaces ({keyword.decode()})",
+                "Convert them to polygons and export the mesh again",
+            )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from service.mesh import moves
+from service.mesh import limits, moves
 from service.mesh.faults import malformed, unsupported
 from service.mesh.meshfile import Faces, Linear, MeshFile, Vertices
 from service.mesh.plybody import Rows, as_doubles, read_rows
@@ -65,7 +65,25 @@ class PlyFile(MeshFile):
             columns |= {n: (rows, turned[:, i]) for i, n in enumerate(NORMAL)}
         if not columns:
             return self.data
+        self._check_integers(columns)
         return self._binary(columns) if self.header.order else self._ascii(columns)
+
+    def _check_integers(self, columns: dict[str, tuple[Indices, Vertices]]) -> None:
+        """UnsupportedFormat ``integer_coordinates`` for values that integers can't hold."""
+        declared = [e.properties for e in self.header.elements if e.name == "vertex"][-1]
+        for item in declared:
+            if item.name not in columns or item.value.kind == "f":
+                continue
+            values, info = columns[item.name][1], np.iinfo(item.value.str)
+            # Text has nine digits of each number.
+            low, high = max(info.min, 1 - 10**9), min(info.max, 10**9 - 1)
+            if ((values != np.rint(values)) | (values < low) | (values > high)).any():
+                raise unsupported(
+                    "integer_coordinates",
+                    f"The PLY file stores {item.name!r} as {item.value.name}, which can't hold "
+                    "where the edit moves its vertices",
+                    "Export coordinates as float or double, or ask for another format",
+                )
 
     def _binary(self, columns: dict[str, tuple[Indices, Vertices]]) -> bytes:
         data = np.frombuffer(bytearray(self.data), np.uint8)
@@ -91,6 +109,8 @@ class PlyFile(MeshFile):
 def _read_elements(header: Header, body: memoryview, at: int) -> dict[str, Rows]:
     elements: dict[str, Rows] = {}
     for element in header.elements:
+        # Before rows of different lengths are stepped through one by one.
+        (limits.check_vertices if element.name == "vertex" else limits.check_faces)(element.count)
         elements[element.name] = read_rows(
             element if header.order else as_doubles(element), body, at
         )
@@ -101,15 +121,6 @@ def _read_elements(header: Header, body: memoryview, at: int) -> dict[str, Rows]
 def _vertex_rows(header: Header, elements: dict[str, Rows]) -> Rows:
     if "vertex" not in elements or not all(n in elements["vertex"].scalars for n in POSITION):
         raise malformed("ply", "it has no 'vertex' element with x, y and z")
-    for element in header.elements:
-        for item in element.properties:
-            coordinate = element.name == "vertex" and item.name in POSITION + NORMAL
-            if coordinate and item.value.kind != "f":
-                raise unsupported(
-                    "integer_coordinates",
-                    f"The PLY file stores {item.name!r} as {item.value.name}",
-                    "Export coordinates as float or double",
-                )
     return elements["vertex"]
 
 

@@ -8,12 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from service import deadline
 from service.errors import InvalidMesh
 from service.mesh.faults import malformed
 from service.mesh.plyheader import Element
 from service.mesh.polygons import Indices
 
 Column = NDArray[np.generic]
+
+# Rows between two looks at the clock.
+STRIDE = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -115,10 +119,14 @@ def _as_first(element: Element, data: memoryview, start: int) -> Layout | None:
 
 def _one_by_one(element: Element, data: memoryview, start: int) -> Layout:
     """The layout by stepping from row to row."""
+    if [item.count for item in element.properties if item.count] == [np.dtype(np.uint8)]:
+        return _by_table(element, data, start)
     starts: list[int] = []
     lengths: list[list[int]] = [[] for item in element.properties if item.count is not None]
     at = start
-    for _ in range(element.count):
+    for row in range(element.count):
+        if row % STRIDE == 0:
+            deadline.check()
         starts.append(at)
         found = iter(lengths)
         for item in element.properties:
@@ -131,6 +139,28 @@ def _one_by_one(element: Element, data: memoryview, start: int) -> Layout:
     if at > len(data):
         raise cut_short(element)
     return Layout(np.array(starts), [np.array(found, np.int64) for found in lengths], at)
+
+
+def _by_table(element: Element, data: memoryview, start: int) -> Layout:
+    """`_one_by_one` for rows of one list whose length is a byte, as nearly all files have them."""
+    before = [item.count is None for item in element.properties].index(False)
+    lead = sum(item.value.itemsize for item in element.properties[:before])
+    size = element.properties[before].value.itemsize
+    smallest = element.smallest_row
+    steps = [smallest + length * size for length in range(256)]
+    starts: list[int] = []
+    at = start
+    try:
+        for _ in range(element.count):
+            starts.append(at)
+            at += steps[data[at + lead]]
+    except IndexError:
+        raise cut_short(element) from None
+    if at > len(data):
+        raise cut_short(element)
+    placed = np.array(starts, np.int64)
+    lengths = np.frombuffer(data, np.uint8)[placed + lead].astype(np.int64)
+    return Layout(placed, [lengths], at)
 
 
 def _length(data: memoryview, at: int, dtype: np.dtype[np.generic], element: Element) -> int:

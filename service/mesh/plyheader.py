@@ -68,7 +68,7 @@ def read_header(data: bytes) -> Header:
     if not data.startswith(b"ply") or end is None:
         raise malformed("ply", "there is no header from 'ply' to 'end_header'")
     order: str | None = None
-    elements: list[Element] = []
+    elements: list[tuple[str, int, list[Property]]] = []
     for line in re.split(r"\r\n|\n|\r", data[: end.start()].decode("latin-1"))[1:]:
         match line.split():
             case [] | ["comment" | "obj_info", *_]:
@@ -76,16 +76,15 @@ def read_header(data: bytes) -> Header:
             case ["format", encoding, _] if encoding in ORDERS:
                 order = ORDERS[encoding]
             case ["element", name, count] if re.fullmatch("[0-9]{1,12}", count):
-                elements.append(Element(name, int(count), ()))
+                elements.append((name, int(count), []))
             case ["property", *words] if elements:
-                last = elements[-1]
-                added = (*last.properties, _property(words, order or "", line))
-                elements[-1] = Element(last.name, last.count, added)
+                elements[-1][2].append(_property(words, order or "", line))
             case _:
                 raise malformed("ply", f"its header has the line {quoted(line)}")
     if order is None:
         raise malformed("ply", "its header has no 'format' line")
-    return Header(order, tuple(elements), end.end())
+    found = tuple(Element(name, count, tuple(items)) for name, count, items in elements)
+    return Header(order, found, end.end())
 
 
 def _property(words: list[str], order: str, line: str) -> Property:

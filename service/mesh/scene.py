@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,12 @@ from service.mesh.faults import unsupported
 
 Matrix = NDArray[np.float64]
 
+# Shapes for collisions, by the names that game engines know them by, numbered by some tools.
+HELPER = re.compile(
+    r"(UCX|UBX|UCP|USP)_.*|.*(_collider|_collision|-colonly|-convcolonly)([._]?\d+)?",
+    re.IGNORECASE | re.DOTALL,
+)
+
 
 @dataclass(frozen=True)
 class Instance:
@@ -21,12 +28,14 @@ class Instance:
     Attributes:
         node, mesh, skin: their numbers in the document.
         world: ``[4, 4]`` transform of the node.
+        hidden: it is not there to be seen.
     """
 
     node: int
     mesh: int
     skin: int | None
     world: Matrix
+    hidden: bool
 
 
 @dataclass(frozen=True)
@@ -41,18 +50,19 @@ def read_scene(document: Document) -> Scene:
     """Walk the active scene, else the first, else all nodes."""
     instances: list[Instance] = []
     worlds: dict[int, Matrix] = {}
-    pending = [(node, np.eye(4)) for node in reversed(_roots(document))]
+    pending = [(node, np.eye(4), False) for node in reversed(_roots(document))]
     while pending:
-        index, parent = pending.pop()
+        index, parent, hidden = pending.pop()
         node = document.entry("nodes", index)
         if index in worlds:
             raise document.wrong(f"nodes[{index}] has two parents, or is its own ancestor")
         worlds[index] = parent @ _local(document, node)
         limits.check_parts(len(worlds))
+        hidden = hidden or _hides(document, node)
         if "mesh" in node:
-            instances.append(_instance(document, index, node, worlds[index]))
+            instances.append(_instance(document, index, node, worlds[index], hidden))
         children = reversed(document.array(node, "children"))
-        pending += [(child, worlds[index]) for child in children]
+        pending += [(child, worlds[index], hidden) for child in children]
     return Scene(instances, worlds)
 
 
@@ -68,7 +78,15 @@ def _roots(document: Document) -> list[int]:
     return [index for index in range(len(nodes)) if index not in children]
 
 
-def _instance(document: Document, index: int, node: Object, world: Matrix) -> Instance:
+def _hides(document: Document, node: Object) -> bool:
+    """Whether a node keeps itself and what is below it from being seen."""
+    visibility = document.object(document.object(node, "extensions"), "KHR_node_visibility")
+    return visibility.get("visible") is False or bool(HELPER.fullmatch(str(node.get("name", ""))))
+
+
+def _instance(
+    document: Document, index: int, node: Object, world: Matrix, hidden: bool
+) -> Instance:
     if "EXT_mesh_gpu_instancing" in document.object(node, "extensions"):
         raise unsupported(
             "gpu_instancing",
@@ -76,7 +94,7 @@ def _instance(document: Document, index: int, node: Object, world: Matrix) -> In
             "Export every instance as a node of its own",
         )
     skin = document.natural(node, "skin") if "skin" in node else None
-    return Instance(index, document.natural(node, "mesh"), skin, world)
+    return Instance(index, document.natural(node, "mesh"), skin, world, hidden)
 
 
 def _local(document: Document, node: Object) -> Matrix:

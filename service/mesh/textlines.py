@@ -10,18 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service import deadline
+from service.mesh import limits
 from service.mesh.faults import malformed, quoted
 from service.mesh.polygons import Indices
 
 Bytes = NDArray[np.uint8]
 
-NEWLINE, HASH = ord("\n"), ord("#")
+NEWLINE, RETURN, HASH, BACKSLASH = b"\n\r#\\"
 # Every byte up to the space counts as white space.
 SPACE = ord(" ")
-# A comment, which may well end in a backslash, or the end of a line that goes on.
-CONTINUATION = re.compile(rb"#[^\n]*|\\\r?\n")
 # Indentation is stripped a column at a time up to here, then a line at a time.
 COLUMNS = 64
+TOKEN = re.compile(rb"[^\x00- ]+")
 
 
 class TextLines:
@@ -37,10 +38,11 @@ class TextLines:
     def __init__(self, format: str, data: bytes, continued: bool = False) -> None:
         """Find the lines; with `continued`, a backslash before a newline joins two lines."""
         self.format = format
+        limits.check_lines(data.count(b"\n"))
         self.data = data
         text = data
         if continued and (b"\\\n" in text or b"\\\r\n" in text):
-            text = CONTINUATION.sub(_joined, text)
+            text = joined(text)
         if b"\r" in text:
             text = text.replace(b"\r", b" " if b"\n" in text else b"\n")
         # As long as the file, plus room to compare a keyword at the last line.
@@ -120,9 +122,18 @@ class TextLines:
         return Tokens(self.format, gathered, begins, starts)
 
 
-def _joined(match: re.Match[bytes]) -> bytes:
-    found = match[0]
-    return found if found.startswith(b"#") else b" " * len(found)
+def joined(data: bytes) -> bytes:
+    """`data` with the ends of lines that go on blanked; a comment may well end in a backslash."""
+    text = np.frombuffer(data, np.uint8).copy()
+    ends = np.flatnonzero(text == NEWLINE)
+    marks = np.maximum(ends - 1 - (text[ends - 1] == RETURN), 0)
+    hashes = np.flatnonzero(text == HASH)
+    before = np.searchsorted(hashes, ends)
+    commented = np.diff(before, prepend=0) > 0
+    going_on = (text[marks] == BACKSLASH) & ~commented
+    for places in (ends, ends - 1, marks):
+        text[places[going_on]] = SPACE
+    return text.tobytes()
 
 
 def without_comments(text: Bytes) -> Bytes:
@@ -178,11 +189,14 @@ class Tokens:
 
 def token_edges(text: Bytes) -> Indices:
     """``[2 T]`` start, end, start, end ... of the T tokens of `text`."""
-    return np.flatnonzero(np.diff(text > SPACE, prepend=False, append=False))
+    edges = np.flatnonzero(np.diff(text > SPACE, prepend=False, append=False))
+    limits.check_tokens(len(edges) // 2)
+    return edges
 
 
 def numbers(format: str, text: Bytes, count: int, dtype: type) -> NDArray[np.float64]:
     """``[count]`` numbers from white-space separated `text`; InvalidMesh if it holds others."""
+    deadline.check()
     if count == 0:
         return np.empty(0, dtype)
     try:
@@ -197,9 +211,9 @@ def numbers(format: str, text: Bytes, count: int, dtype: type) -> NDArray[np.flo
 
 def first_other(text: Bytes) -> str:
     """The first token that is no number, quoted, for a message."""
-    for token in text.tobytes().split():
+    for match in TOKEN.finditer(text.tobytes()):
         try:
-            float(token)
+            float(match[0])
         except ValueError:
-            return quoted(token.decode("latin-1"))
+            return quoted(match[0][:80].decode("latin-1"))
     return "text"

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import struct
 
 import numpy as np
 import trimesh
 from gltf_assets import Asset
+from hypothesis import settings
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+def examples(count: int) -> settings:
+    """Of a property: so many, and a hundred times as many with HYPOTHESIS_PROFILE=long."""
+    factor = 100 if os.environ.get("HYPOTHESIS_PROFILE") == "long" else 1
+    return settings(max_examples=factor * count, deadline=None, database=None)
 
 
 def ball() -> tuple[Array, NDArray[np.int64], Array]:
@@ -47,15 +55,16 @@ def bend_some(points: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
 
 def glb() -> bytes:
     """The ball, with normals, as one mesh in a GLB."""
-    return _asset().glb()
+    return asset().glb()
 
 
 def gltf() -> bytes:
     """The ball, with normals, as one mesh in a glTF with an embedded buffer."""
-    return _asset().gltf()
+    return asset().gltf()
 
 
-def _asset() -> Asset:
+def asset() -> Asset:
+    """The ball, with normals, as one mesh."""
     vertices, faces, normals = ball()
     asset = Asset()
     attributes = {

@@ -9,7 +9,7 @@ from gltf_assets import Asset
 
 from service.errors import InvalidMesh, TooLarge, UnsupportedFormat
 from service.mesh import limits
-from service.mesh.accessors import Accessor, read_accessor
+from service.mesh.accessors import Accessor, read_accessor, sharing_bytes
 from service.mesh.buffers import Buffers
 from service.mesh.document import Document
 
@@ -92,16 +92,17 @@ def test_nothing_stored_is_all_zero() -> None:
     assert accessor.spans == []
 
 
-def test_spans_overlap_within_a_buffer() -> None:
+def test_accessors_that_may_share_bytes_are_told() -> None:
     asset = Asset()
+    apart = asset.accessor(POINTS)
     first = asset.accessor(POINTS)
     view = asset.root["accessors"][first]["bufferView"]
-    same = read(asset, asset.accessor(POINTS[2:], view, byteOffset=24))[0].spans[0]
-    span = read(asset, first)[0].spans[0]
-    other = read(asset, asset.accessor(POINTS))[0].spans[0]
-    assert span.overlaps(same)
-    assert same.overlaps(span)
-    assert not span.overlaps(other)
+    row = asset.accessor(POINTS[:1], view, byteOffset=12)
+    rest = asset.accessor(POINTS[2:], view, byteOffset=24)
+    woven = asset.interleaved(POINTS, POINTS)
+    after = asset.accessor(POINTS)
+    accessors = [read(asset, i)[0] for i in (apart, first, row, rest, *woven, after)]
+    assert sharing_bytes(accessors) == {first, row, rest, *woven}
 
 
 BROKEN: list[dict[str, Any]] = [
@@ -164,6 +165,18 @@ def test_compressed_views_are_refused() -> None:
     asset.root["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": {}}
     with pytest.raises(UnsupportedFormat, match="compressed_geometry"):
         read(asset, index)
+
+
+def test_sparse_accessors_of_nothing_have_a_largest_size() -> None:
+    asset = Asset()
+    rows, points = np.array([0], "<u2"), np.zeros((1, 3), "<f4")
+    index = asset.sparse(rows, points, base=limits.VERTICES + 1)
+    with pytest.raises(TooLarge, match="too_many_vertices"):
+        read(asset, index)
+    entry = asset.root["accessors"][asset.sparse(rows, points, base=4)]
+    entry["sparse"]["count"] = 1 << 52
+    with pytest.raises(InvalidMesh, match="too short"):
+        read(asset, index + 1)
 
 
 def test_unstored_accessors_have_a_largest_size() -> None:

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.errors import InvalidMesh
+from service.errors import InvalidMesh, TooLarge
+from service.mesh import limits
 from service.mesh.corners import NORMAL, POSITION, Corners
 from service.mesh.textlines import TextLines
 
@@ -81,3 +82,12 @@ def test_many_faces_alike_are_one_table() -> None:
     _, positions, normals = read(data)
     assert positions == (table[:, 0::3] - 1).reshape(-1).tolist()
     assert normals == (table[:, 2::3] - 1).reshape(-1).tolist()
+
+
+def test_polygons_without_end_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = TextLines("obj", b"f 1 2 3\nf 1\nf 1 2 3 4\n")
+    monkeypatch.setattr(limits, "FACES", 3)
+    assert Corners(lines).counts.tolist() == [3, 1, 4]
+    monkeypatch.setattr(limits, "FACES", 2)
+    with pytest.raises(TooLarge, match="too_many_faces"):
+        Corners(lines)

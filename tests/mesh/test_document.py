@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 
-from service.errors import InvalidMesh, UnsupportedFormat
-from service.mesh.document import Document
+from service.errors import InvalidMesh, TooLarge, UnsupportedFormat
+from service.mesh import limits
+from service.mesh.document import DEEPEST, Document
 
 
 def document(**members: Any) -> Document:
@@ -24,6 +25,36 @@ def test_text_that_is_no_document_is_malformed(encoded: bytes) -> None:
 
 def test_byte_order_mark_is_no_part_of_the_json() -> None:
     assert Document("gltf", b'\xef\xbb\xbf{"x": 1}').root == {"x": 1}
+
+
+def nested(depth: int) -> Any:
+    value: Any = {}
+    for _ in range(depth):
+        value = {"a": value, "b": [1]}
+    return value
+
+
+def test_nesting_has_an_end() -> None:
+    assert document(extras=nested(DEEPEST - 2)).root["asset"]
+    for depth in (DEEPEST - 1, 800):
+        with pytest.raises(InvalidMesh, match=r"malformed_glb.*nested"):
+            document(extras=nested(depth))
+
+
+@pytest.mark.parametrize("values", ["[]", "{}", "0", '{"a":0}', "[0,[]]"])
+def test_values_are_counted_before_they_are_parsed(
+    values: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "VALUES", 1000)
+    monkeypatch.setattr(json, "loads", None)
+    text = '{"asset":{"version":"2.0"},"extras":[' + ",".join([values] * 1000) + "]}"
+    with pytest.raises(TooLarge, match="too_many_json_values"):
+        Document("gltf", text.encode())
+
+
+def test_long_strings_are_one_value(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "VALUES", 10)
+    assert document(extras="x" * 10_000).root["extras"]
 
 
 @pytest.mark.parametrize("version", ["1.0", 1, "3.1"])
@@ -94,3 +125,14 @@ def test_containers_are_checked(kind: str, call: str) -> None:
 def test_entries_must_be_objects() -> None:
     with pytest.raises(InvalidMesh, match="not an object"):
         document(meshes=[3]).entry("meshes", 0)
+
+
+def test_a_name_that_stands_twice_is_refused() -> None:
+    with pytest.raises(InvalidMesh, match="twice"):
+        Document("gltf", b'{"asset":{},"meshes":[{"a":1,"b":2,"a":3}]}')
+
+
+@pytest.mark.parametrize("value", [10**400, -(10**400), float("inf")])
+def test_numbers_beyond_floats_are_refused(value: float) -> None:
+    with pytest.raises(InvalidMesh, match="2 numbers"):
+        document().numbers({"v": [0, value]}, "v", [0.0, 0.0])

@@ -8,9 +8,10 @@ import mesh_samples
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from mesh_samples import SAMPLES, bend, bend_some, still
+from mesh_samples import SAMPLES, bend, bend_some, examples, still
+from zip_samples import zipped
 
 from service.errors import InvalidMesh, ShapeError, UnsupportedFormat
 from service.mesh.formats import READERS, detect, read_mesh
@@ -27,7 +28,7 @@ REAL = [
     if path.stat().st_size < 400_000
 ]
 
-fuzz = settings(max_examples=200, deadline=None, database=None)
+fuzz = examples(200)
 
 
 def attempt(call: Callable[..., Result], *arguments: Any) -> Result | ShapeError:
@@ -63,19 +64,33 @@ def test_first_bytes_tell_the_format(sample: str) -> None:
         ("chair", "MODEL/STL", "stl"),
         ("chair", "application/octet-stream", "obj"),
         (None, None, "obj"),
+        ("chair.Zip", None, "zip"),
+        ("chair", "application/x-zip-compressed", "zip"),
     ],
 )
 def test_name_then_type_then_bytes(name: str | None, content_type: str | None, format: str) -> None:
     assert detect(SAMPLES["obj"], name, content_type) == format
 
 
-@pytest.mark.parametrize("data", [b"", b"PK\x03\x04", b"hello world\n", b"\0" * 200])
+@pytest.mark.parametrize("data", [b"", b"hello world\n", b"\0" * 200])
 def test_unknown_bytes_are_refused(data: bytes) -> None:
     with pytest.raises(UnsupportedFormat) as caught:
         read_mesh(data, "thing.bin", "application/octet-stream")
     assert caught.value.code == "unsupported_format"
     assert "'thing.bin'" in caught.value.detail
     assert ".glb" in caught.value.suggestion or "glb" in caught.value.suggestion
+
+
+@pytest.mark.parametrize("data", [zipped({"a.obj": b"v 1 2 3"}), zipped({})])
+def test_archives_are_known_by_their_first_bytes(data: bytes) -> None:
+    assert detect(data, "chair.upload", None) == "zip"
+
+
+def test_scenes_of_other_tools_are_refused_with_a_way_out() -> None:
+    with pytest.raises(UnsupportedFormat) as caught:
+        read_mesh(b'<?xml version="1.0"?><COLLADA/>', "chair.dae", "model/vnd.collada+xml")
+    assert caught.value.code == "unsupported_format"
+    assert "export GLB" in caught.value.suggestion
 
 
 @pytest.mark.parametrize("sample", SAMPLES)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from service.errors import InvalidRequest
 from service.mesh.frame import AXES, CANONICAL, Orientation, orientations
@@ -39,6 +40,34 @@ def test_the_canonical_orientation_comes_first_and_changes_nothing() -> None:
 def test_a_file_with_z_up_is_tipped_forward() -> None:
     turn = Orientation(up="+z", front="-y").rotation
     assert (turn @ [1, 2, 3]).tolist() == [1, 3, -2]
+
+
+def test_a_lean_is_a_further_turn_after_the_axes() -> None:
+    way = Orientation("+z", "-y")
+    leaning = way.leaning(np.array([0.0, 0.3, 0.0])).leaning(np.array([0.2, 0.0, 0.0]))
+    turn = Rotation.from_rotvec([0.2, 0, 0]) * Rotation.from_rotvec([0, 0.3, 0])
+    np.testing.assert_allclose(leaning.rotation, turn.as_matrix() @ way.rotation, atol=1e-15)
+    assert (leaning.up, leaning.front) == (way.up, way.front)
+    assert leaning.degrees == pytest.approx(np.degrees(turn.magnitude()))
+    assert way.degrees == 0.0
+
+
+@pytest.mark.parametrize("lean", [np.zeros(3), np.array([0.1, -0.2, 0.05])])
+@pytest.mark.parametrize("way", orientations()[:8])
+def test_points_and_maps_go_there_and_back(way: Orientation, lean: np.ndarray) -> None:
+    way = way.leaning(lean)
+    rng = np.random.default_rng(0)
+    points, maps = rng.normal(size=(5, 3)), rng.normal(size=(5, 3, 3))
+    there = way.to_canonical(points)
+    np.testing.assert_allclose(there, points @ way.rotation.T, atol=1e-15)
+    np.testing.assert_allclose(way.to_own(there), points, atol=1e-15)
+    own = np.einsum("nij,nj->ni", way.maps_to_own(maps), points)
+    np.testing.assert_allclose(own, way.to_own(np.einsum("nij,nj->ni", maps, there)), atol=1e-14)
+
+
+def test_what_does_not_move_stays_where_it_is_to_the_last_bit() -> None:
+    leaning = CANONICAL.leaning(np.array([0.1, -0.2, 0.05]))
+    assert not leaning.to_own(np.zeros((4, 3))).any()
 
 
 @pytest.mark.parametrize("axis", AXES)

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from gltf_assets import Asset
+from gltf_assets import Asset, unpack
 from mesh_samples import ball
 
 from service.errors import InvalidMesh, ShapeError, TooLarge, UnsupportedFormat
 from service.mesh import limits
+from service.mesh.document import Document
 from service.mesh.formats import read_mesh
-from service.mesh.geometry import triangles
+from service.mesh.geometry import read_geometry, triangles
 
 VERTICES, FACES, NORMALS = ball()
 POINTS = VERTICES.astype("<f4")
@@ -49,6 +50,27 @@ def test_a_scene_is_what_trimesh_shows() -> None:
     assert np.isclose(ours.volume, oracle.volume)
     assert np.allclose(ours.bounds, oracle.bounds)
     assert np.allclose(ours.moment_inertia, oracle.moment_inertia)
+
+
+def test_helpers_move_but_are_not_seen() -> None:
+    asset = Asset()
+    mesh = asset.mesh(primitive(asset))
+    asset.node(mesh=mesh, name="chair_collider", scale=[2, 2, 2])
+    asset.node(mesh=mesh, name="chair")
+    found = read_mesh(asset.glb())
+    assert len(found.faces) == 160
+    assert np.array_equal(found.visible, found.faces[80:])
+
+
+@pytest.mark.parametrize("name", ["chair", "chair_collider"])
+def test_what_is_alone_is_seen(name: str) -> None:
+    asset = Asset()
+    asset.node(mesh=asset.mesh(primitive(asset)), name=name)
+    lines = {**primitive(asset), "mode": 1}
+    asset.node(mesh=asset.mesh(lines), name="wire")
+    found = read_mesh(asset.glb())
+    assert np.array_equal(found.visible, found.faces)
+    assert len(found.visible) == 80
 
 
 def test_vertices_come_by_node_then_primitive() -> None:
@@ -207,3 +229,43 @@ def test_a_scene_that_shows_nothing_is_empty() -> None:
     asset.node()
     with pytest.raises(ShapeError, match="empty_mesh"):
         read_mesh(asset.glb())
+
+
+def unfolding(primitives: int, nodes: int, entry: dict[str, object], **members: object) -> bytes:
+    """Primitives of three positions, each with an accessor of its own without any bytes."""
+    asset = Asset()
+    position = asset.accessor(np.eye(3, dtype="<f4"))
+    listed = []
+    for _ in range(primitives):
+        attributes = {"POSITION": position}
+        own = asset._add("accessors", {"componentType": 5125, "count": 3, **entry})
+        if entry["type"] == "VEC3":
+            attributes["NORMAL"] = own
+        listed.append({"attributes": attributes, **members})
+        if entry["type"] == "SCALAR":
+            listed[-1]["indices"] = own
+    mesh = asset.mesh(*listed)
+    for _ in range(nodes):
+        asset.node(mesh=mesh)
+    return asset.glb()
+
+
+@pytest.mark.parametrize(
+    ("name", "most", "data"),
+    [
+        # Points add neither vertices nor faces.
+        ("PARTS", 23, unfolding(6, 4, {"type": "VEC2"}, mode=0)),
+        # Strips of one vertex over and over add no faces.
+        ("FACES", 9, unfolding(10, 1, {"type": "SCALAR"}, mode=5)),
+        ("VERTICES", 7, unfolding(10, 1, {"type": "VEC3", "componentType": 5126})),
+    ],
+)
+def test_what_adds_nothing_is_counted_too(
+    monkeypatch: pytest.MonkeyPatch, name: str, most: int, data: bytes
+) -> None:
+    monkeypatch.setattr(limits, name, most)
+    with pytest.raises(TooLarge, match=f"too_many_{name.lower()}"):
+        read_mesh(data)
+    monkeypatch.setattr(limits, name, most + 1)
+    attempt = Document("glb", unpack(data)[1].rstrip())
+    read_geometry(attempt, [memoryview(unpack(data)[2])])

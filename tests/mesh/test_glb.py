@@ -8,7 +8,8 @@ import pytest
 from gltf_assets import BIN, JSON, Asset, pack, unpack
 from mesh_samples import ball, bend, glb, still
 
-from service.errors import InvalidMesh, UnsupportedFormat
+from service.errors import InvalidMesh, TooLarge, UnsupportedFormat
+from service.mesh import limits
 from service.mesh.formats import read_mesh
 from service.mesh.glb import read_chunks
 
@@ -107,3 +108,12 @@ def test_a_document_of_nothing_is_empty() -> None:
 def test_first_version_is_unsupported() -> None:
     with pytest.raises(UnsupportedFormat, match="gltf_version"):
         read_mesh(GLB[:4] + struct.pack("<I", 1) + GLB[8:])
+
+
+def test_chunks_without_end_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = pack(TEXT, CHUNK, *[(0x59, b"")] * 3)
+    monkeypatch.setattr(limits, "PARTS", 5)
+    read_chunks(data)
+    monkeypatch.setattr(limits, "PARTS", 4)
+    with pytest.raises(TooLarge, match="too_many_parts"):
+        read_chunks(data)

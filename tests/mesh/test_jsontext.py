@@ -63,3 +63,8 @@ def test_splicing_is_setting(
 
 def test_dump_is_compact_and_keeps_letters() -> None:
     assert dump({"ü": [1, 0.1]}) == '{"ü":[1,0.1]}'
+
+
+def test_half_a_surrogate_pair_stays_an_escape() -> None:
+    text = splice('{"a":"\\ud800","b":1}', {("b",): {"\ud800": "ü"}})
+    assert text.encode() == b'{"a":"\\ud800","b":{"\\ud800":"\\u00fc"}}'

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from mesh_samples import ball, bend, bend_some, obj, still
 
-from service.errors import InvalidMesh
+from service.errors import InvalidMesh, UnsupportedFormat
 from service.mesh.formats import read_mesh
 from service.mesh.meshfile import MeshFile
 
@@ -105,6 +105,26 @@ def test_line_ends_of_other_systems(end: str) -> None:
     written = mesh.write(*bend(mesh.vertices))
     assert written.count(b"\r") == data.count(b"\r")
     assert written.replace(end.encode(), b"\n") == read(obj()).write(*bend(mesh.vertices))
+
+
+def test_names_in_any_encoding_and_no_last_newline() -> None:
+    text = "o стул\nv 0 0 0 1.0\nv 1e0 0 0 1.0\nv 0 .1e+1 0 1.0\ng Stühle\nf 1 2 3"
+    for encoding in ("utf-8", "cp1251", "latin-1", "utf-16-le"):
+        name = text.encode("utf-8").partition(b"\n")[0] + "ü".encode(encoding, "replace")
+        data = name + b"\n" + text.partition("\n")[2].replace("ü", "u").encode()
+        mesh = read(data)
+        written = mesh.write(mesh.vertices * 2, still(3))
+        assert written == data.replace(b"1e0", b"2").replace(b".1e+1", b"2")
+
+
+@pytest.mark.parametrize("line", ["surf 0 1 0 1 1 2 3 4", "curv 0 1 1 2 3", "\tcurv2 1 2 3"])
+def test_free_form_surfaces_are_refused(line: str) -> None:
+    text = f"v 0 0 0\nv 1 0 0\nv 0 1 0\nvp 0.1 0.2\n{line}\nf 1 2 3\n"
+    with pytest.raises(UnsupportedFormat) as caught:
+        read(text)
+    assert caught.value.code == "free_form"
+    assert line.split()[0] in caught.value.detail
+    assert len(read(text.replace(line, f"# {line}\no surf")).faces) == 1
 
 
 def test_trimesh_reads_the_same() -> None:

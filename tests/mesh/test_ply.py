@@ -8,9 +8,10 @@ import pytest
 import trimesh
 from mesh_samples import ball, bend, bend_some, ply, still
 
-from service.errors import InvalidMesh, UnsupportedFormat
+from service.errors import InvalidMesh, TooLarge, UnsupportedFormat
 from service.mesh.formats import read_mesh
 from service.mesh.meshfile import MeshFile
+from service.mesh.plyheader import TYPES
 
 VERTICES, FACES, NORMALS = ball()
 COUNT = len(VERTICES)
@@ -136,11 +137,45 @@ def test_binary_with_mixed_polygons() -> None:
     assert written == head.encode() + body + (square + np.float32([0, 0, 2])).tobytes()
 
 
-@pytest.mark.parametrize("name", ["x", "nz"])
-def test_integer_coordinates_are_refused(name: str) -> None:
-    data = ply("").replace(f"property float {name}\n".encode(), f"property int {name}\n".encode())
-    with pytest.raises(UnsupportedFormat, match="integer_coordinates"):
-        read(data)
+def integers(order: str, kind: str) -> bytes:
+    """A tetrahedron whose coordinates are of an integer `kind`."""
+    names = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}
+    head = f"ply\nformat {names[order]} 1.0\nelement vertex 4\n"
+    head += "".join(f"property {kind} {axis}\n" for axis in "xyz")
+    head += "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    corners = np.array([[0, 0, 0], [100, 0, 0], [0, 100, 0], [0, 0, 100]])
+    if not order:
+        return (head + "".join("{} {} {}\n".format(*row) for row in corners)
+                + "3 0 1 2\n3 0 2 3\n").encode()  # fmt: skip
+    rows = corners.astype(np.dtype(order + TYPES[kind])).tobytes()
+    faces = b"".join(struct.pack(order + "B3i", 3, *face) for face in ((0, 1, 2), (0, 2, 3)))
+    return head.encode() + rows + faces
+
+
+@pytest.mark.parametrize("order", ["", "<", ">"])
+@pytest.mark.parametrize("kind", ["char", "ushort", "int"])
+def test_integer_coordinates_take_integers_alone(order: str, kind: str) -> None:
+    data = integers(order, kind)
+    mesh = read(data)
+    assert mesh.vertices[1].tolist() == [100, 0, 0]
+    doubled = mesh.vertices.copy()
+    doubled[2, 1] = 127
+    written = mesh.write(doubled, still(4))
+    assert np.array_equal(read(written).vertices, doubled)
+    assert len(written) == len(data)
+    limits = {"char": (-129, 128), "ushort": (-1, 65536), "int": (-(10**9), 10**9)}[kind]
+    for value in (50.5, *limits):
+        doubled[2, 1] = value
+        with pytest.raises(UnsupportedFormat, match=r"integer_coordinates.*'y'"):
+            mesh.write(doubled, still(4))
+
+
+@pytest.mark.parametrize("name", ["vertex", "face", "edge"])
+def test_counts_that_no_mesh_has_are_refused_before_anything_is_read(name: str) -> None:
+    head = f"ply\nformat binary_little_endian 1.0\nelement {name} 4000001\n"
+    head += "property list uchar int numbers\nend_header\n"
+    with pytest.raises(TooLarge, match="too_many"):
+        read(head.encode() + bytes(4_000_001))
 
 
 FACE = "3 {} {} {}\n".format(*FACES[0]).encode()

@@ -82,6 +82,14 @@ def test_impossible_lengths_are_malformed(content: bytes) -> None:
         read_rows(Element("face", 2, (LIST,)), memoryview(content), 0)
 
 
+@pytest.mark.parametrize("content", [b"", b"\1\1\0\0\0", b"\0\0\2" + bytes(8)])
+def test_rows_of_one_short_list_may_not_end_early(content: bytes) -> None:
+    corners = Property("l", np.dtype("<i4"), np.dtype("u1"))
+    shade = Property("c", np.dtype("u1"), None)
+    with pytest.raises(InvalidMesh, match="ends within"):
+        read_rows(Element("face", 2, (corners, shade)), memoryview(content), 0)
+
+
 def test_elements_without_properties_take_no_time() -> None:
     rows = read_rows(Element("none", 1 << 39, ()), memoryview(b"abc"), 1)
     assert (rows.end, rows.scalars, rows.lists) == (1, {}, {})

@@ -87,6 +87,37 @@ def test_rotation_of_length_zero_is_none() -> None:
     assert np.array_equal(scene.instances[0].world, np.eye(4))
 
 
+@pytest.mark.parametrize(
+    ("name", "hidden"),
+    [
+        ("Chair_collider", True),
+        ("Chair_COLLIDER.001", True),
+        ("seat_collision", True),
+        ("leg-colonly", True),
+        ("leg-convcolonly2", True),
+        ("UCX_Chair_01", True),
+        ("ubx_seat", True),
+        ("UCP_\n", True),
+        ("collider_of_ideas", False),
+        ("Chair", False),
+        ("USPTO", False),
+        ("leg-col", False),
+        (7, False),
+    ],
+)
+def test_nodes_named_as_helpers_are_hidden(name: object, hidden: bool) -> None:
+    nodes = [{"mesh": 0, "name": name, "children": [1]}, {"mesh": 1}, {"mesh": 2}]
+    scene = read_scene(document(nodes=nodes))
+    assert [instance.hidden for instance in scene.instances] == [hidden, hidden, False]
+
+
+def test_nodes_that_say_so_are_hidden() -> None:
+    extension = {"KHR_node_visibility": {"visible": False}}
+    nodes = [{"mesh": 0, "extensions": extension}, {"mesh": 0}]
+    root = document(nodes=nodes, extensionsRequired=["KHR_node_visibility"])
+    assert [instance.hidden for instance in read_scene(root).instances] == [True, False]
+
+
 def test_gpu_instancing_is_refused() -> None:
     nodes = [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}}]
     with pytest.raises(UnsupportedFormat, match="gpu_instancing"):

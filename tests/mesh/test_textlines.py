@@ -1,15 +1,20 @@
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.errors import InvalidMesh
+from service.errors import InvalidMesh, TooLarge
+from service.mesh import limits
 from service.mesh.textlines import (
     COLUMNS,
     TextLines,
+    joined,
     numbers,
+    token_edges,
     without_comments,
 )
 
@@ -83,6 +88,14 @@ def test_numbers_are_parsed_or_told() -> None:
     assert tokens.first.tolist() == [0, 2]
 
 
+@pytest.mark.parametrize("token", [b"1" * 3_000_000, b"0." + b"3" * 3_000_000, b"x" * 3_000_000])
+def test_a_number_without_end_is_told_briefly(token: bytes) -> None:
+    text = np.frombuffer(b"2 " + token + b"y 3\n", np.uint8)
+    with pytest.raises(InvalidMesh) as caught:
+        numbers("off", text, 3, np.float64)
+    assert len(caught.value.detail) < 120
+
+
 @pytest.mark.parametrize("token", [b"x", b"1-2", b"1.2.3", b"0x10", b"1,2", b"\xff", b"--1", b"\0"])
 def test_tokens_that_are_no_numbers_are_malformed(token: bytes) -> None:
     text = np.frombuffer(b"1 " + token + b" 3\n", np.uint8)
@@ -104,3 +117,24 @@ def test_comments_are_blanked_to_the_end_of_their_line(text: str) -> None:
     )
     found = without_comments(np.frombuffer(text.encode(), np.uint8))
     assert found.tobytes().decode() == expected
+
+
+@settings(deadline=None, database=None)
+@given(st.text(alphabet="\\\n\r# a", max_size=20))
+def test_lines_are_joined_outside_of_comments(text: str) -> None:
+    def blanked(match: re.Match[bytes]) -> bytes:
+        return match[0] if match[0].startswith(b"#") else b" " * len(match[0])
+
+    expected = re.sub(rb"#[^\n]*|\\\r?\n", blanked, text.encode())
+    assert joined(text.encode()) == expected
+
+
+def test_lines_and_tokens_without_end_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "LINES", 4)
+    TextLines("obj", b"a\n" * 4)
+    with pytest.raises(TooLarge, match="too_many_lines"):
+        TextLines("obj", b"a\n" * 5)
+    monkeypatch.setattr(limits, "TOKENS", 3)
+    assert len(token_edges(np.frombuffer(b" 1 2 3", np.uint8))) == 6
+    with pytest.raises(TooLarge, match="too_many_tokens"):
+        token_edges(np.frombuffer(b"1 2 3 4", np.uint8))
