@@ -11,9 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from service.template.frames import Frames
 from service.template.parameters import Derived, Parameter
 
 Array = NDArray[np.float64]
+
+TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,10 @@ class AffineTemplate:
         parts: names of the ``P`` parts.
         hidden: ``[F]`` bool, faces inside the shape, never seen from outside.
         frame_base, frame_jacobian: ``[P, 3, 4]`` and ``[P, 3, 4, d]``; a part is the image of a
-            fixed unit shape under its frame, ``frame @ [u, 1]``.
+            fixed unit shape under its frame, ``frame @ [u, 1]``, to which a part that tapers adds
+            ``u[run] taper @ u``.
+        taper_base, taper_jacobian: ``[P, 3, 3]`` and ``[P, 3, 3, d]``.
+        run: ``[P]`` int64, the axis along which each part tapers and leans.
         anchors: ``[1 + d]`` rows a coordinate, by name: points an edit can hold in place.
     """
 
@@ -53,12 +59,30 @@ class AffineTemplate:
     hidden: NDArray[np.bool_]
     frame_base: Array
     frame_jacobian: Array
+    taper_base: Array
+    taper_jacobian: Array
+    run: NDArray[np.int64]
     anchors: dict[str, Array]
 
     @property
     def names(self) -> tuple[str, ...]:
         """The parameter names, in order."""
         return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def stands(self) -> bool:
+        """Shapes of the category stand on a floor: that is what an edit holds in place first."""
+        return next(iter(self.anchors)) == "floor"
+
+    @property
+    def public(self) -> NDArray[np.bool_]:
+        """``[d]`` the parameters that users see: all but the nuisance ones."""
+        return np.array([not parameter.nuisance for parameter in self.parameters])
+
+    @property
+    def signed(self) -> NDArray[np.bool_]:
+        """``[d]`` the parameters that may be negative."""
+        return np.array([parameter.signed for parameter in self.parameters])
 
     @property
     def low(self) -> Array:
@@ -75,8 +99,27 @@ class AffineTemplate:
         return self.base + np.einsum("vcd,...d->...vc", self.jacobian, f)
 
     def frames(self, f: Array) -> Array:
-        """``[P, 3, 4]`` map from each part's unit shape to space, for ``f [d]``."""
+        """``[P, 3, 4]`` map from each part's unit shape to space, for ``f [d]``, less its taper."""
         return self.frame_base + self.frame_jacobian @ f
+
+    def maps(self, f: Array) -> Frames:
+        """The whole map of each part, tapers included, and its inverse, for ``f [d]``."""
+        tapers = self.taper_base + self.taper_jacobian @ f
+        return Frames(self.frames(f), tapers, self.run)
+
+    def following(self, f: Array) -> Array:
+        """``[d, d]`` changes of all parameters for changes of those named, from ``f [d]`` on.
+
+        The identity, but that a nuisance parameter which follows another moves with it in
+        proportion, by no more than the other does: a high wing stays on top of a taller fuselage,
+        a T-tail on the tip of a longer fin.
+        """
+        matrix = np.eye(len(f))
+        for index, parameter in enumerate(self.parameters):
+            if parameter.follows is not None:
+                leader = self.names.index(parameter.follows)
+                matrix[index, leader] = np.clip(f[index] / max(f[leader], TINY), -1.0, 1.0)
+        return matrix
 
     def broken_relations(self, f: Array) -> list[str]:
         """The relations that parameters ``f [d]`` do not keep, as the file writes them."""
@@ -102,7 +145,7 @@ class AffineTemplate:
         for corner in range(3):
             np.add.at(normals, self.faces[:, corner], crosses)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
-        return normals / np.maximum(length, np.finfo(float).tiny)
+        return normals / np.maximum(length, TINY)
 
     def _crosses(self, vertices: Array) -> Array:
         a, b, c = (vertices[self.faces[:, corner]] for corner in range(3))

@@ -37,6 +37,12 @@ def parse_affine(text: str | float, names: Sequence[str]) -> Affine:
     return _Evaluator(source, names).visit_node(tree.body)
 
 
+def parse_rows(texts: Sequence[str | float], names: Sequence[str]) -> Affine:
+    """``[n, 1 + d]`` coefficients of several expressions; see `parse_affine`."""
+    rows = [parse_affine(text, names) for text in texts]
+    return np.array(rows).reshape(-1, 1 + len(names))
+
+
 class _Evaluator:
     """Walks an expression tree; every value on the way is an affine row."""
 

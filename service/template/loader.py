@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
-from service.template.affine import AffineTemplate, Array
-from service.template.expressions import ExpressionError, parse_affine
+from service.template.affine import AffineTemplate
+from service.template.expressions import ExpressionError, parse_affine, parse_rows
 from service.template.parameters import Derived, Parameter
-from service.template.shapes import UnitShape, box
+from service.template.parts import Part, PartError, read_parts
 
 
 class TemplateError(ValueError):
@@ -47,9 +46,10 @@ def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:
     """Compile a template from the parsed YAML; see `chair.yaml` for the entries."""
     try:
         parameters = tuple(_parameter(name, entry) for name, entry in spec["parameters"].items())
+        _require_leaders(parameters)
         names = [parameter.name for parameter in parameters]
         parts = [
-            part for name, entry in spec["parts"].items() for part in _parts(name, entry, names)
+            part for name, entry in spec["parts"].items() for part in read_parts(name, entry, names)
         ]
         return AffineTemplate(
             name=spec["name"],
@@ -57,14 +57,14 @@ def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:
             points=int(spec["points"]),
             parameters=parameters,
             derived={n: _derived(n, e, names) for n, e in spec.get("derived", {}).items()},
-            relations=_rows(spec.get("relations", []), names),
+            relations=parse_rows(spec.get("relations", []), names),
             relation_texts=tuple(map(str, spec.get("relations", []))),
-            anchors={name: _rows(point, names) for name, point in spec["keep"].items()},
+            anchors={name: parse_rows(point, names) for name, point in spec["keep"].items()},
             **_assemble(parts),
         )
     except KeyError as error:
         raise TemplateError(f"the entry {error} is missing") from error
-    except ExpressionError as error:
+    except (ExpressionError, PartError) as error:
         raise TemplateError(str(error)) from error
     except TemplateError:
         raise
@@ -72,49 +72,12 @@ def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:
         raise TemplateError(f"an entry has the wrong form: {error}") from error
 
 
-class _Part:
-    """One placed unit shape: its frame's ``[3, 4, 1 + d]`` rows and its hidden faces."""
-
-    def __init__(self, name: str, shape: UnitShape, frame: Array, hidden: Sequence[str]) -> None:
-        self.name = name
-        self.shape = shape
-        self.frame = frame
-        unknown = set(hidden) - set(shape.sides)
-        if unknown:
-            raise TemplateError(f"part {name!r}: no side is named {sorted(unknown)[0]!r}")
-        self.hidden = np.isin(shape.side, [shape.sides.index(side) for side in hidden])
-
-    def mirrored(self, name: str, axes: str) -> _Part:
-        """The reflection across the planes through the origin that are normal to `axes`."""
-        sign = np.array([-1.0 if axis in axes else 1.0 for axis in "xyz"])
-        faces = self.shape.faces[:, ::-1] if len(axes) % 2 else self.shape.faces
-        copy = _Part.__new__(_Part)
-        copy.name = name
-        copy.shape = UnitShape(self.shape.vertices, faces, self.shape.side, self.shape.sides)
-        copy.frame = sign[:, None, None] * self.frame
-        copy.hidden = self.hidden
-        return copy
-
-
-def _parts(name: str, entry: Mapping[str, Any], names: Sequence[str]) -> list[_Part]:
-    if entry["shape"] != "box":
-        raise TemplateError(f"part {name!r}: no shape is named {entry['shape']!r}; there is 'box'")
-    a, b, c = (int(count) for count in entry["cells"])
-    frame = np.zeros((3, 4, 1 + len(names)))
-    frame[np.arange(3), np.arange(3)] = _rows(entry["size"], names)
-    frame[:, 3] = _rows(entry["center"], names)
-    part = _Part(name, box((a, b, c)), frame, entry.get("hidden", []))
-    return [part, *(part.mirrored(n, axes) for n, axes in entry.get("mirror", {}).items())]
-
-
-def _assemble(parts: Sequence[_Part]) -> dict[str, Any]:
+def _assemble(parts: Sequence[Part]) -> dict[str, Any]:
     """The arrays of all parts, one after the other."""
     offsets = np.cumsum([0, *(len(part.shape.vertices) for part in parts)])
-    coefficients = np.concatenate([
-        np.einsum("vk,ckd->vcd", homogeneous(part.shape.vertices), part.frame)
-        for part in parts
-    ])  # fmt: skip
+    coefficients = np.concatenate([part.vertices() for part in parts])
     frames = np.stack([part.frame for part in parts])
+    tapers = np.stack([part.taper for part in parts])
     return {
         "base": coefficients[..., 0],
         "jacobian": np.ascontiguousarray(coefficients[..., 1:]),
@@ -124,18 +87,22 @@ def _assemble(parts: Sequence[_Part]) -> dict[str, Any]:
         "hidden": np.concatenate([part.hidden for part in parts]),
         "frame_base": frames[..., 0],
         "frame_jacobian": np.ascontiguousarray(frames[..., 1:]),
+        "taper_base": tapers[..., 0],
+        "taper_jacobian": np.ascontiguousarray(tapers[..., 1:]),
+        "run": np.array([part.run for part in parts]),
     }
-
-
-def homogeneous(points: Array) -> Array:
-    """``[n, 3]`` points with a fourth coordinate of 1."""
-    return np.pad(points, ((0, 0), (0, 1)), constant_values=1.0)
 
 
 def _parameter(name: str, entry: Mapping[str, Any]) -> Parameter:
     low, high = (float(end) for end in entry["range"])
-    if not 0.0 < low < high:
-        raise TemplateError(f"parameter {name!r}: the range {[low, high]} is empty or not positive")
+    nuisance = _flag(entry.get("nuisance", False))
+    if not low < high:
+        raise TemplateError(f"parameter {name!r}: the range {[low, high]} is empty")
+    if low <= 0.0 and not nuisance:
+        raise TemplateError(
+            f"parameter {name!r}: the range {[low, high]} is not positive; "
+            "only nuisance parameters may be signed"
+        )
     return Parameter(
         name=name,
         label=entry["label"],
@@ -144,7 +111,28 @@ def _parameter(name: str, entry: Mapping[str, Any]) -> Parameter:
         low=low,
         high=high,
         typical=_interval(entry.get("typical", [low, high])),
+        nuisance=nuisance,
+        follows=entry.get("follows"),
     )
+
+
+def _require_leaders(parameters: Sequence[Parameter]) -> None:
+    """Only nuisance parameters follow, and only public ones lead."""
+    public = [parameter.name for parameter in parameters if not parameter.nuisance]
+    for parameter in parameters:
+        if parameter.follows is None:
+            continue
+        if not parameter.nuisance or parameter.follows not in public:
+            raise TemplateError(
+                f"parameter {parameter.name!r} follows {parameter.follows!r}: a nuisance "
+                "parameter may follow a public one"
+            )
+
+
+def _flag(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError(f"{value!r} is neither true nor false")
+    return value
 
 
 def _derived(name: str, entry: Mapping[str, Any], names: Sequence[str]) -> Derived:
@@ -161,8 +149,3 @@ def _derived(name: str, entry: Mapping[str, Any], names: Sequence[str]) -> Deriv
 
 def _interval(pair: Sequence[float]) -> tuple[float, float]:
     return float(pair[0]), float(pair[1])
-
-
-def _rows(expressions: Sequence[str | float], names: Sequence[str]) -> NDArray[np.float64]:
-    rows = [parse_affine(expression, names) for expression in expressions]
-    return np.array(rows).reshape(-1, 1 + len(names))

@@ -22,6 +22,9 @@ class Parameter:
         paper: what the paper calls it.
         low, high: the range that synthetic shapes are drawn from.
         typical: where most real shapes lie; what a slider spans.
+        nuisance: inferred like the others so that the template fits, but not offered to users.
+        follows: the parameter whose edits carry it along, for a nuisance one (see
+            `AffineTemplate.following`).
     """
 
     name: str
@@ -31,6 +34,13 @@ class Parameter:
     low: float
     high: float
     typical: tuple[float, float]
+    nuisance: bool = False
+    follows: str | None = None
+
+    @property
+    def signed(self) -> bool:
+        """An offset rather than a size: its range reaches down to zero or below."""
+        return self.low <= 0.0
 
 
 @dataclass(frozen=True)

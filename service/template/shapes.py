@@ -1,66 +1,51 @@
-"""Unit shapes that template parts are made of: meshes inside the cube [-1/2, 1/2]^3."""
+"""The unit shapes by the names that template files give them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from service.template.box import box
+from service.template.panel import panel
+from service.template.rounds import ellipsoid, fuselage, tube
+from service.template.unitshape import UnitShape
 
-BOX_SIDES = ("left", "right", "bottom", "top", "back", "front")
-"""The sides of a box in the order of its faces: -x, +x, -y, +y, -z, +z."""
+BUILDERS: dict[str, tuple[Callable[..., UnitShape], tuple[int, ...], tuple[str, ...]]] = {
+    "box": (box, (1, 1, 1), ()),
+    "tube": (tube, (4, 1), ("power",)),
+    "ellipsoid": (ellipsoid, (4, 2), ("power",)),
+    "fuselage": (fuselage, (4, 3), ("nose", "tail", "upsweep", "power")),
+    "panel": (panel, (1, 2), ()),
+}
+"""Each shape's builder, the least of its `cells`, and its options."""
+
+LAID = {
+    "tube": {"x": "yzx", "y": "zxy", "z": "xyz"},
+    "ellipsoid": {"x": "yzx", "y": "zxy", "z": "xyz"},
+    "panel": {"x": "xyz", "y": "yxz", "z": "zyx"},
+}
+"""How shapes that can lie along any axis are turned to it (see `UnitShape.turned`)."""
+
+RUN = {"box": "y", "tube": "y", "ellipsoid": "y", "fuselage": "z", "panel": "x"}
+"""The axis that each shape runs along when the file says none."""
 
 
-@dataclass(frozen=True)
-class UnitShape:
-    """A fixed mesh whose affine images are a part's possible shapes.
-
-    Attributes:
-        vertices: ``[n, 3]`` float64.
-        faces: ``[m, 3]`` int64, counter-clockwise seen from outside.
-        side: ``[m]`` int64, which named side each face lies on.
-        sides: the names.
-    """
-
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    side: NDArray[np.int64]
-    sides: tuple[str, ...]
-
-
-def box(cells: tuple[int, int, int]) -> UnitShape:
-    """A cube of grids, one a side, that share no vertices, so that its normals stay sharp.
+def unit_shape(entry: Mapping[str, Any], along: str) -> UnitShape:
+    """The unit shape of a part's entry, laid along an axis.
 
     Args:
-        cells: number of grid cells along x, y and z.
+        entry: ``shape``, ``cells`` and the shape's own options.
+        along: ``"x"``, ``"y"`` or ``"z"``; boxes and fuselages stay as they are.
 
-    Returns:
-        ``2 sum (a+1)(b+1)`` vertices over the pairs of axes.
+    Raises:
+        ValueError: for an unknown shape, or cells or options out of range.
     """
-    vertices: list[NDArray[np.float64]] = []
-    faces: list[NDArray[np.int64]] = []
-    count = 0
-    for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        for sign in (-0.5, 0.5):
-            points, quads = _grid(cells[u], cells[v])
-            side = np.empty((len(points), 3))
-            side[:, axis] = sign
-            side[:, u], side[:, v] = points.T
-            vertices.append(side)
-            faces.append((quads if sign > 0 else quads[:, ::-1]) + count)
-            count += len(side)
-    labels = np.repeat(np.arange(6), [len(f) for f in faces])
-    return UnitShape(np.concatenate(vertices), np.concatenate(faces), labels, BOX_SIDES)
-
-
-def _grid(columns: int, rows: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """A unit square of ``columns x rows`` cells: ``[n, 2]`` points and ``[m, 3]`` triangles."""
-    u, v = np.meshgrid(
-        np.linspace(-0.5, 0.5, columns + 1), np.linspace(-0.5, 0.5, rows + 1), indexing="ij"
-    )
-    corner = np.arange((columns + 1) * (rows + 1)).reshape(columns + 1, rows + 1)
-    a, b = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel()
-    c, d = corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    return np.stack([u.ravel(), v.ravel()], axis=1), triangles
+    kind = entry["shape"]
+    if kind not in BUILDERS:
+        raise ValueError(f"no shape is named {kind!r}; there are {', '.join(BUILDERS)}")
+    build, least, options = BUILDERS[kind]
+    cells = tuple(int(count) for count in entry["cells"])
+    if len(cells) != len(least) or any(n < m for n, m in zip(cells, least, strict=True)):
+        raise ValueError(f"cells of a {kind} are {len(least)} numbers, {list(least)} at the least")
+    shape = build(cells, **{name: float(entry[name]) for name in options if name in entry})
+    return shape.turned(LAID[kind][along]) if kind in LAID else shape

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from service.template.affine import AffineTemplate
-from service.template.loader import TemplateError, compile_template, homogeneous, load_template
+from service.template.loader import TemplateError, compile_template, load_template
 
 SPEC: dict[str, Any] = {
     "name": "table",
@@ -144,8 +144,35 @@ def test_hidden_sides_are_hidden_in_every_copy(table: AffineTemplate) -> None:
     assert np.bincount(part[table.hidden], minlength=4).tolist() == [0, 2, 2, 2]
 
 
-def test_homogeneous_points_end_in_one() -> None:
-    assert homogeneous(np.array([[2.0, 3.0, 4.0]])).tolist() == [[2, 3, 4, 1]]
+def test_nuisance_parameters_may_be_signed_and_are_not_public() -> None:
+    entry = {"label": "Offset", "group": "top", "range": [-0.2, 0.3], "nuisance": True}
+    template = compile_template(changed("parameters.offset", entry))
+    assert template.names == ("width", "height", "offset")
+    assert template.public.tolist() == [True, True, False]
+    assert template.signed.tolist() == [False, False, True]
+    assert (template.low[2], template.high[2]) == (-0.2, 0.3)
+    positive = compile_template(changed("parameters.offset", entry | {"range": [0.1, 0.3]}))
+    assert not positive.signed.any()
+    assert positive.public.tolist() == [True, True, False]
+
+
+def test_what_follows_nothing_moves_alone(table: AffineTemplate) -> None:
+    np.testing.assert_array_equal(table.following(np.array([1.2, 0.7])), np.eye(2))
+
+
+@pytest.mark.parametrize("follows", ["offset", "depth"])
+def test_a_nuisance_parameter_follows_a_public_one_only(follows: str) -> None:
+    entry = {"label": "Offset", "group": "top", "range": [-0.2, 0.3], "nuisance": True}
+    good = compile_template(changed("parameters.offset", entry | {"follows": "width"}))
+    assert good.following(np.array([2.0, 0.5, 0.3])).tolist() == [
+        [1, 0, 0],
+        [0, 1, 0],
+        [0.15, 0, 1],
+    ]
+    for bad in (entry | {"follows": follows}, entry | {"follows": "width", "nuisance": False,
+                                                       "range": [0.1, 0.2]}):  # fmt: skip
+        with pytest.raises(TemplateError, match="'offset' follows"):
+            compile_template(changed("parameters.offset", bad))
 
 
 @pytest.mark.parametrize(
@@ -168,7 +195,10 @@ def test_homogeneous_points_end_in_one() -> None:
         ("parameters.width.range", 3, "an entry has the wrong form"),
         ("parameters.width.range", ["low", "high"], "an entry has the wrong form"),
         ("parameters", ["width"], "an entry has the wrong form"),
-        ("parts.leg.cells", [1, 2], "an entry has the wrong form"),
+        ("parameters.width.range", [-1, 1], "only nuisance parameters may be signed"),
+        ("parameters.width.nuisance", "maybe", "an entry has the wrong form"),
+        ("parts.leg.cells", [1, 2], "part 'leg': cells of a box are 3 numbers"),
+        ("parts.leg.along", "w", "part 'leg': along 'w' is no axis"),
         ("parts.leg.center", [0, 0], "an entry has the wrong form"),
         ("derived.total.by", ["depth"], "an entry has the wrong form"),
     ],

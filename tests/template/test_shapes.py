@@ -1,73 +1,66 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-import trimesh
-from hypothesis import given
-from hypothesis import strategies as st
+import pytest
 
-from service.template.shapes import BOX_SIDES, UnitShape, box
+from service.template.shapes import BUILDERS, RUN, unit_shape
 
-NORMALS = {
-    "left": (-1, 0, 0),
-    "right": (1, 0, 0),
-    "bottom": (0, -1, 0),
-    "top": (0, 1, 0),
-    "back": (0, 0, -1),
-    "front": (0, 0, 1),
+ENTRIES: dict[str, dict[str, Any]] = {
+    "box": {"cells": [2, 3, 4]},
+    "tube": {"cells": [8, 4], "power": 3},
+    "ellipsoid": {"cells": [8, 6]},
+    "fuselage": {"cells": [8, 12], "nose": 0.2, "tail": 0.4},
+    "panel": {"cells": [4, 6]},
 }
-CELLS = st.tuples(*[st.integers(1, 5)] * 3)
 
 
-def crosses(shape: UnitShape) -> np.ndarray:
-    """``[m, 3]`` face normals, twice the area long."""
-    a, b, c = (shape.vertices[shape.faces[:, corner]] for corner in range(3))
-    return np.cross(b - a, c - a)
+def test_every_shape_has_an_entry_here() -> None:
+    assert set(ENTRIES) == set(BUILDERS) == set(RUN)
 
 
-@given(CELLS)
-def test_a_box_has_one_grid_a_side(cells: tuple[int, int, int]) -> None:
-    shape = box(cells)
-    a, b, c = cells
-    pairs = [(a, b), (b, c), (c, a)]
-    assert len(shape.vertices) == 2 * sum((i + 1) * (j + 1) for i, j in pairs)
-    assert len(shape.faces) == len(shape.side) == 4 * sum(i * j for i, j in pairs)
-    assert shape.vertices.dtype == np.float64
-    assert shape.faces.dtype == shape.side.dtype == np.int64
+@pytest.mark.parametrize("kind", ENTRIES)
+def test_shapes_fill_the_unit_cube_whichever_way_they_lie(kind: str) -> None:
+    for along in "xyz":
+        shape = unit_shape({"shape": kind, **ENTRIES[kind]}, along)
+        ends = [shape.vertices.min(axis=0), shape.vertices.max(axis=0)]
+        np.testing.assert_allclose(ends, [[-0.5] * 3, [0.5] * 3], atol=1e-12)
 
 
-@given(CELLS)
-def test_its_faces_close_the_unit_cube_and_look_outwards(cells: tuple[int, int, int]) -> None:
-    shape = box(cells)
-    solid = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
-    solid.merge_vertices()
-    assert solid.is_watertight
-    np.testing.assert_allclose(solid.volume, 1.0, atol=1e-12)
-    np.testing.assert_allclose(solid.bounds, [[-0.5] * 3, [0.5] * 3])
-    size = 0.5 * np.linalg.norm(crosses(shape), axis=1)
-    np.testing.assert_allclose(size.sum(), 6.0, atol=1e-12)
+@pytest.mark.parametrize("kind", ["tube", "panel"])
+@pytest.mark.parametrize("along", ["x", "y", "z"])
+def test_the_flat_ends_lie_across_the_run(kind: str, along: str) -> None:
+    shape = unit_shape({"shape": kind, **ENTRIES[kind]}, along)
+    axis = "xyz".index(along)
+    for side, place in (("start", -0.5), ("end", 0.5)):
+        faces = shape.faces[shape.side == shape.sides.index(side)]
+        assert (shape.vertices[faces][..., axis] == place).all()
 
 
-@given(CELLS)
-def test_the_cells_along_an_axis_are_even_and_as_many_as_asked(
-    cells: tuple[int, int, int],
-) -> None:
-    shape = box(cells)
-    for axis, count in enumerate(cells):
-        places = np.unique(shape.vertices[:, axis].round(12))
-        np.testing.assert_allclose(places, np.linspace(-0.5, 0.5, count + 1), atol=1e-12)
+def test_options_reach_the_shape() -> None:
+    square = unit_shape({"shape": "tube", "cells": [8, 3], "power": 50}, "z")
+    round_ = unit_shape({"shape": "tube", "cells": [8, 3]}, "z")
+    assert np.linalg.norm(square.vertices[1, :2]) > 1.3 * np.linalg.norm(round_.vertices[1, :2])
 
 
-def test_each_face_is_on_the_side_it_is_labelled_with() -> None:
-    shape = box((2, 3, 4))
-    assert shape.sides == BOX_SIDES
-    expected = np.array([NORMALS[shape.sides[side]] for side in shape.side])
-    normals = crosses(shape)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    np.testing.assert_allclose(normals, expected, atol=1e-12)
-    assert set(shape.side) == set(range(6))
-
-
-def test_sides_share_no_vertices() -> None:
-    shape = box((2, 3, 4))
-    owners = [set(shape.faces[shape.side == side].ravel()) for side in range(6)]
-    assert sum(map(len, owners)) == len(set.union(*owners)) == len(shape.vertices)
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ({"shape": "sphere", "cells": [8, 8]}, "no shape is named 'sphere'; there are box, tube"),
+        ({"shape": "box", "cells": [8, 8]}, "cells of a box are 3 numbers"),
+        ({"shape": "box", "cells": [1, 0, 1]}, "cells of a box are 3 numbers"),
+        ({"shape": "tube", "cells": [2, 8]}, "cells of a tube are 2 numbers, .4, 1. at the least"),
+        ({"shape": "tube", "cells": [6, 8]}, "6 vertices around at power 2"),
+        (
+            {"shape": "tube", "cells": [8, 8], "power": 0},
+            "give a multiple of 4 and a positive power",
+        ),
+        ({"shape": "ellipsoid", "cells": [8, 5]}, "10 vertices around"),
+        ({"shape": "panel", "cells": [8]}, "cells of a panel are 2 numbers"),
+        ({"shape": "fuselage", "cells": [8, 8], "nose": 0.7, "tail": 0.7}, "nose 0.7 and tail 0.7"),
+    ],
+)
+def test_what_makes_no_shape_is_refused(entry: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        unit_shape(entry, "y")
