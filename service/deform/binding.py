@@ -23,10 +23,10 @@ class Binding:
     Attributes:
         jacobian: ``[V, 3, d]`` float32, displacement per unit of each parameter; its columns are
             morph targets, exact in any combination.
-        gains: ``[V, 3 P]`` float32, how far each vertex follows the stretch of each part along the
-            part's own three axes.
-        stretches: ``[3 P, 9, d]`` float32, the linear map (row-major 3 x 3) that a unit of each
-            parameter adds along each axis of each part.
+        gains: ``[V, k]`` float32, how far each vertex follows each of the ways that the parts
+            stretch: three a box, along its axes, and more where a part tapers.
+        stretches: ``[k, 9, d]`` float32, the linear map (row-major 3 x 3) that a unit of each
+            parameter adds to each.
     """
 
     jacobian: Array32
@@ -59,36 +59,8 @@ def inverse_frames(frames: Array) -> Array:
 
 
 def part_stretches(template: AffineTemplate, inverses: Array) -> Array32:
-    """`Binding.stretches`: for part p and its axis m, ``dA_p[:, m] (A_p^-1)[m, :]`` for each
-    parameter."""
+    """`Binding.stretches` for part p, less its taper, and its axis m: ``dA_p[:, m] (A_p^-1)[m, :]``
+    for each parameter."""
     outer = np.einsum("pimd,pmj->pmijd", template.frame_jacobian[:, :, :3], inverses)
     parts = len(inverses)
     return np.ascontiguousarray(outer.reshape(3 * parts, 9, -1), np.float32)
-
-
-def compile_binding(
-    template: AffineTemplate,
-    inverses: Array,
-    weights: Array32,
-    local: Array32,
-    gains: Array32,
-) -> Binding:
-    """Compile weights and local coordinates to a Jacobian.
-
-    Args:
-        inverses: ``[P, 3, 3]`` of the part frames at the bound parameters.
-        weights: ``[V, P]`` that sum to one over the parts.
-        local: ``[V, P, 3]`` where each part carries the vertex, in the part's unit frame.
-        gains: ``[V, P, 3]`` derivative of `local` along the part's axes; 1 inside, 0 far outside.
-    """
-    count, parts = weights.shape
-    coefficients = np.empty((count, parts, 4), np.float32)
-    np.multiply(local, weights[:, :, None], out=coefficients[:, :, :3])
-    coefficients[:, :, 3] = weights
-    moves = template.frame_jacobian.transpose(0, 2, 1, 3).reshape(4 * parts, -1)
-    jacobian = coefficients.reshape(count, -1) @ moves.astype(np.float32)
-    return Binding(
-        jacobian=jacobian.reshape(count, 3, -1),
-        gains=(gains * weights[:, :, None]).reshape(count, -1),
-        stretches=part_stretches(template, inverses),
-    )

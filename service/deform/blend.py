@@ -1,6 +1,7 @@
 """The blend rule: each vertex moves with a smooth blend of its parts' affine maps.
 
-1. The mesh is welded and cut into connected pieces (`weld`).
+1. The mesh is welded and cut into connected pieces (`weld`); parts that are measured from the
+   hub's side begin there (`roots`), and round and tapered ones are what they are (`loft`).
 2. Unit coordinates in each part are straightened along the mesh's own legs and back (`spine`).
 3. Pieces that belong to one group of parts follow it as a whole (`pieces`); of others each vertex
    follows the parts that it is near (`proximity`, `seams`, `discord`).
@@ -14,12 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from service.deform.binding import Binding, compile_binding, inverse_frames
+from service.deform.binding import Binding, inverse_frames
 from service.deform.clamp import saturate, stretch_limits
+from service.deform.compilation import compile_binding
 from service.deform.discord import discord, group_fields
 from service.deform.groups import Group, hub_parts, mirror_groups
+from service.deform.loft import lofts
 from service.deform.pieces import Votes, touching_pieces, vote
-from service.deform.proximity import BAND, Boxes, box_distances, group_distance, nearness
+from service.deform.proximity import BAND, Boxes, group_distance, nearness
+from service.deform.roots import rooted
 from service.deform.seams import flush_seams
 from service.deform.shares import Blocks, all_shares
 from service.deform.spine import straighten
@@ -50,19 +54,18 @@ def bind(
     welded = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
     f = np.asarray(f, np.float64)
     x = welded.vertices - np.asarray(t, np.float64)
-    frames = template.frames(f)
-    inverses = inverse_frames(frames)
-    fit = _Fit(template, f, Boxes(frames, inverses), mirror_groups(template))
+    fit = _fit(template, f)
     u = fit.boxes.local(x)
-    spines = straighten(u, welded.faces, fit.boxes, fit.groups, hub_parts(template))
-    distances = box_distances(u, fit.boxes.sizes)
+    hubs = hub_parts(fit.template)
+    spines = straighten(u, welded.faces, fit.boxes, fit.groups, hubs)
+    distances = fit.boxes.distances(u)
     to_group = np.stack(
         [group_distance(x, distances, fit.boxes, group) for group in fit.groups], axis=1
     )
     low, high = welded.boxes()
     votes = vote(
         u, distances, to_group, welded.piece, touching_pieces(low, high), fit.groups,
-        fit.boxes, hub_parts(template),
+        fit.boxes, hubs,
     )  # fmt: skip
     blocks = Blocks(welded.piece, high - low, votes.whole)
     shares = all_shares(u, fit.boxes, fit.groups, blocks)
@@ -70,7 +73,7 @@ def bind(
     weights = shares.copy()
     for g, group in enumerate(fit.groups):
         weights[:, list(group.members)] *= near[:, g, None]
-    bound = compile_binding(template, inverses, weights, local, gains)
+    bound = compile_binding(fit.template, fit.boxes, weights, local, gains)
     return Binding(bound.jacobian[welded.of], bound.gains[welded.of], bound.stretches)
 
 
@@ -80,6 +83,14 @@ class _Fit:
     f: Array
     boxes: Boxes
     groups: list[Group]
+
+
+def _fit(template: AffineTemplate, f: Array) -> _Fit:
+    cut, starts = rooted(template, f)
+    maps = cut.maps(f)
+    parts = lofts(template, maps.frames, maps.tapers, starts)
+    boxes = Boxes(maps.frames, inverse_frames(maps.frames), parts)
+    return _Fit(cut, f, boxes, mirror_groups(cut))
 
 
 def _follow(
@@ -99,10 +110,11 @@ def _follow(
     near = votes.shares[welded.piece]
     free = np.flatnonzero(~votes.whole[welded.piece])
     if len(free):
-        seams = flush_seams(fit.template, fit.boxes.frames, spines)
+        seams = flush_seams(fit.template, fit.boxes, spines)
         local[free], slope = seams.carry(local[free])
         gains[free] *= slope
         fields = group_fields(fit.template, shares[free], local[free], fit.groups)
-        band = BAND + DISCORD * discord(fields, to_group[free], fit.f)
+        offered = np.where(fit.template.public, fit.f, 0.0)
+        band = BAND + DISCORD * discord(fields, to_group[free], offered)
         near[free] = nearness(to_group[free], band)
     return local, gains, near

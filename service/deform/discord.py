@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from service.deform.compilation import carried, part_moves
 from service.deform.groups import Group
 from service.deform.proximity import Array, Array32
 from service.template.affine import AffineTemplate
@@ -16,10 +17,9 @@ def group_fields(
     template: AffineTemplate, shares: Array32, local: Array32, groups: list[Group]
 ) -> Array32:
     """Displacements per unit of each parameter as each group alone has them, ``[G, n, 3 d]``."""
-    coefficients = np.concatenate([local, np.ones_like(local[:, :, :1])], axis=2)
+    coefficients = carried(template, local)
     coefficients *= shares[:, :, None]
-    moves = template.frame_jacobian.transpose(0, 2, 1, 3).astype(np.float32)
-    moves = moves.reshape(len(moves), 4, -1)
+    moves = part_moves(template)
     fields = np.empty((len(groups), len(local), moves.shape[2]), np.float32)
     for g, group in enumerate(groups):
         members = list(group.members)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from service.deform.choice import CARRIED, TOUCH, Cases, choose, mean_distance, realised
 from service.deform.groups import Group
 from service.deform.proximity import Boxes
 
@@ -21,15 +22,8 @@ Array32 = NDArray[np.float32]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-# Normalised length that counts as touching.
-TOUCH = 0.012
-# A piece goes with the nearest group when the next is this much farther, by factor and length.
-CLEARLY = (1.25, 0.02)
-# A piece that makes up a part is left to its vertices when it runs on so far from it, as a root
-# mean square over and above what its vertices need.
-BEYOND = 0.06
-# Shares of the part's length under which a piece is carried, and over which it is stretched.
-CARRIED, STRETCHED = 0.4, 0.7
+# Share of the part's length over which a piece is stretched; see `CARRIED`.
+STRETCHED = 0.7
 # The same for a rod along its own axis, such as a spindle, which is held at both ends.
 ROD = (0.1, 0.2)
 # With more pieces than this, as in a broken scan, each is carried by itself.
@@ -86,24 +80,46 @@ def vote(
     low, high = _extent(u, None, starts)
     near = distances <= np.repeat(nearest, np.diff([*starts, len(u)]), axis=0) + np.float32(TOUCH)
     touch_low, touch_high = _extent(u, near, starts)
-    made = np.asarray(nearest < TOUCH) & _realised(touch_low, touch_high, thin)
-    shares = _shares(made, nearest, to_group[order], starts, groups, hubs)
+    made = np.asarray(nearest < TOUCH) & realised(touch_low, touch_high, boxes)
+    cost = mean_distance(to_group[order], starts)
+    free = mean_distance(to_group[order].min(axis=1, keepdims=True), starts)
+    cases = Cases(made, nearest, cost, free, high - low, touching)
+    shares = choose(cases, groups, boxes, hubs)
+    skin = _skin(cost, groups, boxes)
+    rods = _elongated((high - low) * boxes.sizes.astype(np.float32))
+    # Nothing holds the tip of a propeller's blade, off the wing, as a spindle's ends are held.
+    rods &= (_by_part(cost, groups) < 2 * TOUCH)[:, :, None] | ~boxes.lofted[:, None]
+    member = _by_part(shares, groups) == 1.0
+    low, high = _assemble(low, high, member[:, :, None] & ~rods, touching, thin)
+    keep = np.where(rods, _stretch(high - low, *ROD), _stretch(high - low, CARRIED, STRETCHED))
     # Where a piece makes up the part, it is as thick as the part; else it is carried at the spot
     # nearest the part's middle where it touches.
-    member = _membership(shares, groups)
-    long = _elongated((high - low) * boxes.sizes.astype(np.float32))
-    low, high = _assemble(low, high, member[:, :, None] & ~long, touching, thin)
-    keep = np.where(long, _stretch(high - low, *ROD), _stretch(high - low, CARRIED, STRETCHED))
+    keep = np.where(thin, made[:, :, None], keep)
+    keep[skin | np.isnan(shares[:, :1])] = 1.0
+    contact = np.clip(np.clip(0.0, touch_low, touch_high), -0.5, 0.5)
+    anchor = np.where(thin & ~made[:, :, None], contact, _anchor(low, high))
+    return Votes(shares, keep.astype(np.float32), anchor.astype(np.float32))
+
+
+def _anchor(low: Array32, high: Array32) -> Array32:
+    """``[pieces, P, 3]`` where along a part a piece is carried: at its side where it is flush."""
     center, half = (low + high) / 2, np.minimum((high - low) / 2, 0.45)
     flush = np.clip(center / (np.float32(0.5) - half), -1.0, 1.0)
-    anchor = np.where(high - low < 1.0, flush * 0.5, np.clip(center, -0.5, 0.5))
-    contact = np.clip(np.clip(0.0, touch_low, touch_high), -0.5, 0.5)
-    attached = thin & ~made[:, :, None]
-    keep = np.where(thin, made[:, :, None], keep)
-    anchor = np.where(attached, contact, anchor)
-    left = np.isnan(shares[:, 0])
-    keep[left] = 1.0
-    return Votes(shares, keep.astype(np.float32), anchor.astype(np.float32))
+    return np.where(high - low < 1.0, flush * 0.5, np.clip(center, -0.5, 0.5))
+
+
+def _skin(cost: Array32, groups: list[Group], boxes: Boxes) -> Mask:
+    """``[pieces, P]`` pieces of a round or tapered part's skin, such as a flap: they stretch with
+    it, lest they tear off the rest."""
+    return np.asarray((_by_part(cost, groups) < TOUCH) & boxes.lofted)
+
+
+def _by_part(values: Array32, groups: list[Group]) -> Array32:
+    """``[pieces, P]`` of each part its group's column of ``values [pieces, G]``."""
+    columns = np.empty((len(values), sum(len(g.members) for g in groups)), np.float32)
+    for g, group in enumerate(groups):
+        columns[:, list(group.members)] = values[:, g, None]
+    return columns
 
 
 def _extent(u: Array32, mask: Mask | None, starts: Index) -> tuple[Array32, Array32]:
@@ -122,55 +138,6 @@ def _elongated(extent: Array32) -> Mask:
     longest = np.argsort(extent, axis=2)[:, :, 2:]
     others = np.sort(extent, axis=2)[:, :, 1:2]
     return (np.arange(3) == longest) & (extent >= 2.0 * others)
-
-
-def _realised(low: Array32, high: Array32, thin: Mask) -> Mask:
-    """``[pieces, P]`` whether what lies inside a part runs along it and through its middle."""
-    inside = np.clip(high, -0.5, 0.5) - np.clip(low, -0.5, 0.5)
-    along = (inside >= 0.5) & ~thin
-    # Not beside the part, as a seat is below a back.
-    within = ((inside >= 0.3 * (high - low)) & (np.abs(low + high) < 0.999)) | thin
-    centered = (np.abs(low + high) <= 0.7) | (high - low >= 0.6) | ~thin
-    return along.any(axis=2) & (centered & within).all(axis=2)
-
-
-def _shares(
-    made: Mask, nearest: Array32, to_group: Array32, starts: Index, groups: list[Group], hubs: Mask
-) -> Array32:
-    makes = np.stack([made[:, list(g.members)].any(axis=1) for g in groups], axis=1)
-    spans = np.stack(
-        [(nearest[:, list(g.members)] < TOUCH).sum(axis=1) > 1 for g in groups], axis=1
-    )
-    counts = np.diff([*starts, len(to_group)])
-    cost = np.sqrt(np.add.reduceat(to_group**2, starts) / counts[:, None])
-    least, factor = cost.min(axis=1, keepdims=True), np.float32(CLEARLY[0])
-    close = cost <= factor * least + np.float32(CLEARLY[1])
-    # Between the hub and a lone part, such as an arm between seat and back, the hub holds; between
-    # the hub and mirrored parts, as under a seat, each vertex decides.
-    hub = np.array([hubs[list(g.members)].any() for g in groups])
-    several = np.array([len(g.members) > 1 for g in groups])
-    held = np.any(close & hub, axis=1) & ~np.any(close & several, axis=1)
-    close = np.where(held[:, None], hub, close)
-    # A piece that makes up a part goes with that part, one from leg to leg with the legs, others
-    # with what is clearly nearest.
-    chosen = np.where(np.any(spans, axis=1)[:, None], spans, close)
-    chosen = np.where(np.any(makes, axis=1)[:, None], makes, chosen)
-    # A post that runs on from a leg into the back makes up the leg, and still belongs to both.
-    free = np.sqrt(np.add.reduceat(to_group.min(axis=1) ** 2, starts) / counts)
-    alone = np.where(makes, cost, np.inf).min(axis=1)
-    beyond = np.isfinite(alone) & (alone > free + np.float32(BEYOND))
-    chosen |= beyond[:, None]
-    shares = chosen.astype(np.float32)
-    shares[chosen.sum(axis=1) > 1] = np.nan
-    return shares
-
-
-def _membership(shares: Array32, groups: list[Group]) -> Mask:
-    """``[pieces, P]`` whether a piece as a whole goes with a part's group."""
-    member = np.zeros((len(shares), sum(len(g.members) for g in groups)), bool)
-    for g, group in enumerate(groups):
-        member[:, list(group.members)] = shares[:, g, None] == 1.0
-    return member
 
 
 def _assemble(

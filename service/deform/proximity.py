@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from service.deform.binding import FLOOR
 from service.deform.groups import Group
+from service.deform.loft import Loft
 
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
@@ -30,10 +31,12 @@ class Boxes:
     Attributes:
         frames: ``[P, 3, 4]``.
         inverses: ``[P, 3, 3]``.
+        lofts: the parts that are more than their boxes.
     """
 
     frames: Array
     inverses: Array
+    lofts: dict[int, Loft] = field(default_factory=dict)
 
     @property
     def sizes(self) -> Array:
@@ -48,18 +51,50 @@ class Boxes:
         thin: NDArray[np.bool_] = sizes < THIN * sizes.max(axis=1, keepdims=True)
         return thin
 
+    @property
+    def long(self) -> NDArray[np.bool_]:
+        """``[P, 3]`` the axes that what makes up a part runs along."""
+        long: NDArray[np.bool_] = ~self.thin
+        for part, loft in self.lofts.items():
+            # A fuselage runs along a fin's chord without being a fin.
+            long[part] = np.arange(3) == loft.run
+        return long
+
     def local(self, x: Array) -> Array32:
         """Unit coordinates ``[V, P, 3]`` of ``x [V, 3]``."""
         maps = self.inverses.transpose(2, 0, 1).reshape(3, -1)
         shift = np.einsum("pij,pj->pi", self.inverses, self.frames[:, :, 3]).reshape(-1)
-        u = (x @ maps - shift).astype(np.float32)
-        return u.reshape(len(x), -1, 3)
+        u = (x @ maps - shift).astype(np.float32).reshape(len(x), -1, 3)
+        for part, loft in self.lofts.items():
+            if loft.tapered:
+                u[:, part] = loft.unit(x)
+        return u
 
+    def distances(self, u: Array32) -> Array32:
+        """Distances ``[V, P]`` to the parts of points with unit coordinates ``u [V, P, 3]``."""
+        beyond = np.maximum(np.abs(u) - np.float32(0.5), 0.0) * self.sizes.astype(np.float32)
+        distances: Array32 = np.sqrt(np.einsum("vpk,vpk->vp", beyond, beyond))
+        for part, loft in self.lofts.items():
+            distances[:, part] = loft.distance(u[:, part])
+        return distances
 
-def box_distances(u: Array32, sizes: Array) -> Array32:
-    """Distances ``[V, P]`` to the parts' boxes of points with unit coordinates ``u [V, P, 3]``."""
-    beyond = np.maximum(np.abs(u) - np.float32(0.5), 0.0) * sizes.astype(np.float32)
-    return np.sqrt(np.einsum("vpk,vpk->vp", beyond, beyond))
+    def runs_along(self, part: int, axis: int) -> bool:
+        """Whether a part lies along an axis of space, as a wing does: its image across that axis
+        is beyond its own end."""
+        return part in self.lofts and self.lofts[part].run == axis
+
+    @property
+    def lofted(self) -> NDArray[np.bool_]:
+        """``[P]`` which are in `lofts`."""
+        return np.isin(np.arange(len(self.frames)), list(self.lofts))
+
+    def tapered(self, part: int) -> bool:
+        """Whether a part tapers."""
+        return part in self.lofts and self.lofts[part].tapered
+
+    def end_to_end(self, group: Group) -> bool:
+        """Whether a group's members do, such as wings: they meet in the middle."""
+        return any(self.runs_along(group.members[0], axis) for axis in group.partners)
 
 
 def nearness(to_group: Array32, band: Array32 | float = BAND) -> Array32:
@@ -78,10 +113,13 @@ def nearness(to_group: Array32, band: Array32 | float = BAND) -> Array32:
 
 
 def group_distance(x: Array, distances: Array32, boxes: Boxes, group: Group) -> Array32:
-    """``[V]`` distance to a group: between its members, less than to the nearest of them."""
+    """``[V]`` distance to a group: between its members, less than to the nearest of them.
+
+    What is between wings is the fuselage's: for them it is the distance to the nearest.
+    """
     members = list(group.members)
     nearest = distances[:, members].min(axis=1)
-    if len(members) == 1:
+    if len(members) == 1 or boxes.end_to_end(group):
         return nearest
     half = 0.5 * np.abs(boxes.frames[members, :, :3]).sum(axis=2)
     center = boxes.frames[members, :, 3]

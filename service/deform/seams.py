@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from service.deform.proximity import Boxes
 from service.deform.spinefit import Spine
 from service.template.affine import AffineTemplate
 
@@ -42,23 +43,26 @@ class Seams:
         return np.clip(inner, -0.5, 0.5) + beyond, gain
 
 
-def flush_seams(template: AffineTemplate, frames: Array, spines: dict[int, Spine]) -> Seams:
-    """Strips for the part frames ``frames [P, 3, 4]`` of axis-aligned boxes.
+def flush_seams(template: AffineTemplate, boxes: Boxes, spines: dict[int, Spine]) -> Seams:
+    """Strips of those parts that are axis-aligned boxes.
 
     A neighbour counts where its side is the part's side for all parameters.  Where the mesh's own
     neighbour is known to stand further in, the strip reaches to its inner face.
     """
     affine = np.concatenate([template.frame_base[..., None], template.frame_jacobian], axis=-1)
+    frames = boxes.frames
     low, high = np.full((len(frames), 3), -0.5), np.full((len(frames), 3), 0.5)
     for part, axis in np.ndindex(len(frames), 3):
         row = affine[part, axis]
         # Only axes that the part's frame doesn't turn.
-        if not row[axis].any() or np.delete(row[:3], axis, 0).any():
+        if part in boxes.lofts or not row[axis].any() or np.delete(row[:3], axis, 0).any():
             continue
         size = float(np.abs(frames[part, axis, axis]))
         for other in range(len(frames)):
             for side in (-1.0, 1.0):
-                if other == part or not _flush(row, affine[other, axis], axis, side):
+                if other == part or other in boxes.lofts:
+                    continue
+                if not _flush(row, affine[other, axis], axis, side):
                     continue
                 width = _reach(frames[other], axis, side, spines.get(other)) / max(size, 1e-9)
                 if width <= WIDEST and side < 0:

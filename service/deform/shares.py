@@ -66,7 +66,8 @@ def group_shares(u: Array32, boxes: Boxes, group: Group, blocks: Blocks) -> Arra
     for axis, partners in group.partners.items():
         apart = 2.0 * float(np.abs(boxes.frames[members[0], axis, 3]))
         half = 0.5 * np.abs(boxes.frames[members, axis, :3]).sum(axis=1)
-        half = np.minimum(half, OWN * apart)
+        if not boxes.runs_along(members[0], axis):
+            half = np.minimum(half, OWN * apart)
         row = boxes.frames[members, axis, :3].astype(np.float32)
         inward = -np.sign(boxes.frames[members, axis, 3])
         offset = np.einsum("vmk,mk->vm", u[:, members], row) * inward.astype(np.float32)

@@ -2,7 +2,7 @@
 
 A template's parts are straight.  Measured from plane sections of the mesh, the middle of the real
 part, as a function of the part's long axes, straightens the unit coordinates: a splayed leg then
-thickens about its own axis.
+thickens about its own axis.  Parts that taper lean with the fit already, and are left as they are.
 """
 
 from __future__ import annotations
@@ -37,15 +37,18 @@ def straighten(
     spines: dict[int, Spine] = {}
     for group in groups:
         for part in group.members:
-            if fixed[part]:
+            if fixed[part] or boxes.tapered(part):
                 continue
             mirrored = np.full(3, np.nan)
             for axis in group.partners:
+                if boxes.runs_along(part, axis):
+                    continue
                 row = np.abs(boxes.frames[part, axis, :3])
                 along = int(row.argmax())
                 size = np.copysign(boxes.sizes[part, along], boxes.frames[part, axis, along])
                 mirrored[along] = -boxes.frames[part, axis, 3] / size
-            spine = measure_spine(u[:, part], faces, boxes.sizes[part], mirrored)
+            run = boxes.lofts[part].run if part in boxes.lofts else 1
+            spine = measure_spine(u[:, part], faces, boxes.sizes[part], mirrored, run)
             if spine is not None:
                 u[:, part, list(spine.thin)] -= spine.shift(u[:, part])
                 spines[part] = spine
@@ -53,7 +56,7 @@ def straighten(
 
 
 def measure_spine(
-    u: NDArray[np.float32], faces: Index, size: Array, mirrored: Array
+    u: NDArray[np.float32], faces: Index, size: Array, mirrored: Array, run: int
 ) -> Spine | None:
     """Measure a part's middle on a mesh, or None where the mesh has no such sections.
 
@@ -63,12 +66,13 @@ def measure_spine(
         size: ``[3]`` lengths of the part's axes.
         mirrored: ``[3]`` unit coordinates of the template's mirror planes, where the part has an
             image beyond; NaN elsewhere.  What straddles them belongs to no one part.
+        run: the axis to cut across; the longest instead where it is one of the thin.
     """
     thin = tuple(int(axis) for axis in np.flatnonzero(size < 0.4 * size.max()))
     long = [axis for axis in range(3) if axis not in thin]
     if not thin or len(thin) == 3:
         return None
-    run = 1 if 1 in long else long[int(size[long].argmax())]
+    run = run if run in long else long[int(size[long].argmax())]
     wide = next((axis for axis in long if axis != run), None)
     near = _near(u, faces, size, run)
     if not len(near):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from service import deadline
 from service.deform.binding import Binding
 from service.deform.flips import flipped
 from service.deform.weld import Welded, weld
@@ -32,6 +33,8 @@ RELAXATIONS = 30
 """Rounds of evening out around folds; each reaches one ring of vertices further."""
 SWEEPS = 15
 """Averaging steps a round."""
+FARTHEST = 0.03
+"""Normalised length by which a repair may move a vertex along an axis in a strong edit."""
 RINGS = 32
 """Rings of faces around folds within which a repair may move anything."""
 
@@ -51,6 +54,7 @@ def unfold(
     jacobian = binding.jacobian
     welded: Welded | None = None
     for index in parameters:
+        deadline.check()
         changes = [np.where(np.arange(len(f)) == index, (k - 1) * f, 0.0) for k in STRONG]
         maps = [binding.linear(change) for change in changes]
         folded = np.zeros(len(faces), bool)
@@ -149,8 +153,10 @@ class _Folds:
 def _repaired(folds: _Folds, column: Array) -> Array:
     """The candidate for a Jacobian's ``column [n, 3]`` that folds the fewest faces."""
     best, (least, folded) = column, folds(column)
+    reach = FARTHEST / max(abs(step) for step in folds.steps)
     for repair in (_merged, _relaxed):
-        for candidate, count in repair(folds, column, folded):
+        for candidate, count in repair(folds, column, folded, reach):
+            deadline.check()
             if count < least:
                 best, least = candidate, count
             if least == 0:
@@ -158,7 +164,9 @@ def _repaired(folds: _Folds, column: Array) -> Array:
     return best
 
 
-def _merged(folds: _Folds, column: Array, folded: NDArray[np.bool_]) -> Iterator[tuple[Array, int]]:
+def _merged(
+    folds: _Folds, column: Array, folded: NDArray[np.bool_], reach: float
+) -> Iterator[tuple[Array, int]]:
     """Let the ends of folded faces' shortest edges move as one, round after round."""
     patch, size = folds.patch, len(column)
     pairs = np.empty((0, 2), np.int64)
@@ -169,13 +177,13 @@ def _merged(folds: _Folds, column: Array, folded: NDArray[np.bool_]) -> Iterator
         label = connected_components(graph, directed=False)[1]
         members = np.bincount(label)
         means = [np.bincount(label, values) / members for values in column.T]
-        candidate = np.stack(means, axis=1)[label]
+        candidate = np.clip(np.stack(means, axis=1)[label], column - reach, column + reach)
         count, folded = folds(candidate)
         yield candidate, count
 
 
 def _relaxed(
-    folds: _Folds, column: Array, folded: NDArray[np.bool_]
+    folds: _Folds, column: Array, folded: NDArray[np.bool_], reach: float
 ) -> Iterator[tuple[Array, int]]:
     """Average over the neighbours in a region around the folds that grows each round."""
     patch = folds.patch
@@ -189,5 +197,6 @@ def _relaxed(
         candidate = candidate.copy()
         for _ in range(SWEEPS):
             candidate[rows] = local @ candidate
+        candidate = np.clip(candidate, column - reach, column + reach)
         count, folded = folds(candidate)
         yield candidate, count

@@ -70,15 +70,29 @@ def _face_pieces(
     """Count of the pieces, and ``[F]`` which each face belongs to."""
     if not len(faces):
         return 0, np.empty(0, np.int64)
-    count = int(welded.max()) + 1
+    count = int(faces.max()) + 1
+    label = _components(faces[:, :2].ravel(), faces[:, 1:].ravel(), count)[faces[:, 0]]
+    # Only edges between places that several of the pieces so far share can join these.
+    at = np.zeros(int(welded.max()) + 1, np.int64)
+    at[welded] = label[:, None]
+    shared = np.zeros(len(at), bool)
+    shared[welded[at[welded] != label[:, None]]] = True
     start, end = welded, welded[:, [1, 2, 0]]
-    key = np.minimum(start, end) * count + np.maximum(start, end)
-    names, edge = np.unique(key, return_inverse=True)
-    # Nodes are the edges, then the mesh's own vertices; a face links all of its six.
-    nodes = np.concatenate([edge.reshape(-1, 3), faces + len(names)], axis=1)
-    total = len(names) + int(faces.max()) + 1
-    links = np.stack([nodes[:, :-1], nodes[:, 1:]]).reshape(2, -1)
-    graph = csr_array((np.ones(links.shape[1], np.int8), tuple(links)), shape=(total, total))
-    _, label = connected_components(graph, directed=False)
-    names, of_face = np.unique(label[nodes[:, 0]], return_inverse=True)
+    face, side = np.nonzero(shared[start] & shared[end])
+    start, end = start[face, side], end[face, side]
+    key = np.minimum(start, end) * len(at) + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(np.diff(key[order]) == 0)
+    first, second = label[face[order[same]]], label[face[order[same + 1]]]
+    label = _components(first, second, count)[label]
+    names, of_face = np.unique(label, return_inverse=True)
     return len(names), of_face
+
+
+def _components(
+    first: NDArray[np.int64], second: NDArray[np.int64], count: int
+) -> NDArray[np.int64]:
+    """``[count]`` which component each of the nodes is in that the pairs link."""
+    links = csr_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
+    label: NDArray[np.int64] = connected_components(links, directed=False)[1]
+    return label

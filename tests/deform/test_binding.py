@@ -3,22 +3,8 @@ from __future__ import annotations
 import numpy as np
 from boxes import ORIGIN, PARAMETERS, chair, template_mesh
 
-from service.deform.binding import compile_binding, inverse_frames
+from service.deform.binding import inverse_frames
 from service.deform.blend import bind
-
-
-def test_a_part_of_full_weight_moves_by_its_frame():
-    template = chair()
-    inverses = inverse_frames(template.frames(PARAMETERS))
-    rng = np.random.default_rng(0)
-    u = rng.uniform(-0.5, 0.5, (7, 6, 3)).astype(np.float32)
-    weights = np.eye(6, dtype=np.float32)[rng.integers(0, 6, 7)]
-    df = rng.uniform(-0.1, 0.1, 8)
-    binding = compile_binding(template, inverses, weights, u, np.ones_like(u))
-    part = weights.argmax(axis=1)
-    own = np.concatenate([u[np.arange(7), part], np.ones((7, 1))], axis=1)
-    expected = np.einsum("vij,vj->vi", (template.frame_jacobian @ df)[part], own)
-    np.testing.assert_allclose(binding.displace(df), expected, atol=1e-6)
 
 
 def test_the_linear_map_carries_the_edges_of_each_part():

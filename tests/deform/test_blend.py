@@ -6,6 +6,15 @@ from boxes import ORIGIN, PARAMETERS, block, chair, change, joined, template_mes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from planes import (
+    VALUES,
+    of_part,
+    on_wing,
+    plane,
+    plane_change,
+    plane_mesh,
+    plane_values,
+)
 
 from model_export.detailed import detailed_chair
 from service.deform.binding import Binding
@@ -185,3 +194,95 @@ def test_a_post_that_runs_from_the_floor_to_the_top_follows_leg_and_back():
     raised = binding.displace(change("leg_height", 0.1))[:count, 1]
     assert raised[height < -0.4].max() < -0.09
     assert np.abs(raised[height > 0.1]).max() < 0.01
+
+
+def bound_plane(mesh: tuple[np.ndarray, np.ndarray]) -> Binding:
+    return bind(*mesh, plane(), plane_values(), ORIGIN)
+
+
+def skin(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """A wing's upper and lower side from the fuselage's side to the tip, at its own fine cells."""
+    grid, faces = block((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5), 8)
+    span, across, chord = (grid - ORIGIN).T
+    points = [on_wing(name, s + 0.5, y, z) for s, y, z in zip(span, across, chord, strict=True)]
+    return np.array(points) + ORIGIN, faces if name == "left_wing" else faces[:, ::-1]
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.25])
+@pytest.mark.parametrize("name", list(VALUES)[:6])
+def test_an_airplane_outside_its_fuselage_moves_as_it_decodes_itself(name, factor):
+    vertices, faces = plane_mesh()
+    df = plane_change(name, factor)
+    moved = bound_plane((vertices, faces)).displace(df)
+    truth = plane().decode(plane_values() + df) + ORIGIN - vertices
+    x = np.abs(vertices - ORIGIN)
+    # Wings and fin are longer from the fuselage's side on, not from within it: exact at the tips.
+    wing = of_part("left_wing") | of_part("right_wing")
+    fin = of_part("vertical_stabilizer")
+    tips = (x[:, 0] > x[:, 0].max() - 1e-9) | (x[:, 1] > x[fin, 1].max() - 1e-9)
+    exact = tips | ~(wing | fin)
+    np.testing.assert_allclose(moved[exact], truth[exact], atol=1e-6)
+    inside = {"fuselage_width": 0.25, "fuselage_height": 0.2}.get(name, 0.15)
+    assert np.abs(moved - truth).max() <= inside * np.abs(df).max() + 1e-6
+
+
+def test_wings_of_their_own_move_as_worked_out_by_hand():
+    wings = joined(skin("left_wing"), skin("right_wing"))
+    binding = bound_plane(wings)
+    span = (np.abs(wings[0] - ORIGIN)[:, 0] - VALUES["fuselage_width"] / 2) / VALUES["wing_length"]
+    side = np.sign((wings[0] - ORIGIN)[:, 0])
+    longer = binding.displace(plane_change("wing_length", 1.25))
+    np.testing.assert_allclose(longer[:, 0], 0.1 * span * side, atol=1e-6)
+    assert np.abs(longer[:, 1:]).max() < 1e-6
+    wider = binding.displace(plane_change("fuselage_width", 1.5))
+    np.testing.assert_allclose(wider[:, 0], 0.25 * VALUES["fuselage_width"] * side, atol=1e-6)
+    stretched = binding.displace(plane_change("fuselage_length", 1.2))
+    ahead = 0.2 * VALUES["wing_position"]
+    np.testing.assert_allclose(stretched, np.tile([0, 0, ahead], (len(span), 1)), atol=1e-6)
+
+
+def test_a_t_tail_rides_on_the_fin_and_the_rest_stays():
+    vertices, faces = plane_mesh()
+    moved = bound_plane((vertices, faces)).displace(
+        plane_change("vertical_stabilizer_length", 1.25)
+    )
+    tail = of_part("left_horizontal_stabilizer") | of_part("right_horizontal_stabilizer")
+    raised = 0.25 * VALUES["horizontal_stabilizer_height"]
+    np.testing.assert_allclose(moved[tail, 1], raised, atol=1e-6)
+    still = of_part("fuselage") | of_part("left_wing") | of_part("right_wing")
+    assert np.abs(moved[still]).max() < 1e-6
+
+
+def test_an_airplane_in_one_piece_is_edited_evenly_without_folds():
+    vertices, faces = plane_mesh()
+    bridge = [[int(np.flatnonzero(of_part(part))[0]) for part in parts] for parts in BRIDGES]
+    whole = vertices, np.concatenate([faces, np.array(bridge)])
+    binding = bound_plane(whole)
+    mirror = np.array([-1.0, 1.0, 1.0])
+    image = (vertices - ORIGIN) * mirror
+    other = np.linalg.norm(image[:, None] - (vertices - ORIGIN)[None], axis=2).argmin(axis=1)
+    for name in list(VALUES)[:6]:
+        df = plane_change(name, 1.25)
+        moved = binding.displace(df)
+        np.testing.assert_allclose(moved[other], moved * mirror, atol=2e-4, err_msg=name)
+        after = vertices + moved
+        assert count_flips(vertices, after, faces, binding.linear(df)) <= 0.002 * len(faces), name
+
+
+BRIDGES = (
+    ("fuselage", "left_wing", "right_wing"),
+    ("fuselage", "left_horizontal_stabilizer", "right_horizontal_stabilizer"),
+    ("fuselage", "vertical_stabilizer", "left_wing"),
+)
+"""Triangles that make the airplane one piece."""
+
+
+@settings(max_examples=10, deadline=None)
+@given(hnp.arrays(np.float64, (12, 3), elements=st.floats(-0.7, 0.7)), st.randoms())
+def test_any_triangles_are_bound_to_an_airplane(points, random):
+    faces = np.array([[random.randrange(12) for _ in range(3)] for _ in range(9)])
+    binding = bound_plane((points, faces))
+    assert np.isfinite(binding.jacobian).all()
+    df = 0.25 * np.where(plane().public, plane_values(), 0.0)
+    assert np.isfinite(binding.linear(df)).all()
+    assert np.abs(binding.displace(df)).max() < 1.0

@@ -60,7 +60,7 @@ def after(dimensions: Dimensions, **changes: tuple[Kind, float]) -> dict[str, fl
 def test_a_parameter_changes_alone(name: str) -> None:
     value = VALUES[name]
     changes: list[tuple[Kind, float, float]] = [
-        ("set", 0.3, 0.3),
+        ("set", 0.17, 0.17) if "leg" in name else ("set", 0.3, 0.3),
         ("add", 0.02, value + 0.02),
         ("scale", 1.5, 1.5 * value),
     ]
@@ -177,28 +177,69 @@ def test_changes_that_agree_with_each_other_are_not_refused() -> None:
     assert values == pytest.approx(VALUES | {"seat_width": 0.6})
 
 
+SIZES = [
+    ("seat_width", ("set", 1e-4), "0.8 * seat_width - 2 * leg_width >= 0"),
+    ("leg_height", ("add", -0.3599), "leg_height > 0"),
+    ("back_height", ("scale", 1e-6), "back_height > 0"),
+    ("leg_width", ("set", 0.3), "0.8 * seat_width - 2 * leg_width >= 0"),
+    ("seat_top_height", ("set", 0.05), "leg_height > 0"),
+    ("total_height", ("set", 0.05), "back_height > 0"),
+    ("total_width", ("set", 1e-4), "seat_width > 0"),
+    ("total_depth", ("scale", 0.01), "0.8 * seat_depth - 2 * leg_depth >= 0"),
+]
+
+
+@pytest.mark.parametrize(("name", "change", "limit"), SIZES)
+def test_what_breaks_a_limit_becomes_the_nearest_that_keeps_it(
+    name: str, change: tuple[Kind, float], limit: str
+) -> None:
+    dimensions = box_chair()
+    outcome = dimensions.outcome({name: Change(*change)})
+    values = outcome.parameters
+    assert limit in outcome.limits
+    assert list(outcome.adjusted) == [name]
+    asked, got = outcome.adjusted[name]
+    now = named(values) | dimensions.derived(values)
+    assert got == now[name]
+    assert (got < asked) == (name == "leg_width")
+    assert (values >= 1e-3 - 1e-12).all()
+    assert (CHAIR.relations @ [1.0, *values] > -1e-12).all()
+    moved = set(CHAIR.derived[name].by) if name in CHAIR.derived else {CHAIR.names.index(name)}
+    assert {i for i, v in enumerate(values) if v != F[i]} <= moved
+
+
+@pytest.mark.parametrize(("name", "change", "limit"), SIZES)
+def test_when_strict_it_is_refused(name: str, change: tuple[Kind, float], limit: str) -> None:
+    with pytest.raises(InvalidRequest) as caught:
+        box_chair().outcome({name: Change(*change)}, strict=True)
+    assert caught.value.code == "edit_out_of_bounds"
+    assert caught.value.detail.startswith(f"{name} can't be ")
+    assert limit in caught.value.detail
+    assert "nearest" in caught.value.suggestion
+
+
 @pytest.mark.parametrize(
-    ("name", "change", "culprit"),
+    ("name", "change"),
     [
-        ("seat_width", ("set", 0.0), "seat_width"),
-        ("seat_width", ("set", -1.0), "seat_width"),
-        ("leg_height", ("add", -0.36), "leg_height"),
-        ("leg_height", ("scale", 0.0), "leg_height"),
-        ("back_height", ("scale", -2.0), "back_height"),
-        ("seat_top_height", ("set", 0.05), "leg_height"),
-        ("total_height", ("set", 0.05), "back_height"),
-        ("total_width", ("set", 0.0), "seat_width"),
-        ("total_depth", ("scale", -1.0), "seat_depth"),
+        ("seat_width", ("set", 0.0)),
+        ("seat_width", ("set", -1.0)),
+        ("leg_height", ("add", -0.36)),
+        ("back_height", ("scale", -2.0)),
+        ("total_width", ("set", 0.0)),
+        ("seat_top_height", ("scale", -1.0)),
     ],
 )
-def test_sizes_that_would_not_be_positive_are_refused(
-    name: str, change: tuple[Kind, float], culprit: str
-) -> None:
+def test_a_size_of_nothing_or_less_makes_no_sense(name: str, change: tuple[Kind, float]) -> None:
     with pytest.raises(InvalidRequest) as caught:
         after(box_chair(), **{name: change})
     assert caught.value.code == "size_not_positive"
-    assert caught.value.detail.startswith(f"{culprit} would be ")
-    assert name in caught.value.detail
+    assert caught.value.detail.startswith(f"{name} would be ")
+
+
+def test_what_keeps_the_limits_is_had_to_the_letter() -> None:
+    changes = {"seat_width": Change("scale", 3.0), "total_height": Change("set", 1.1)}
+    outcome = box_chair().outcome(changes, strict=True)
+    assert (outcome.adjusted, outcome.limits) == ({}, ())
 
 
 def test_an_unknown_name_is_refused_and_the_known_ones_listed() -> None:

@@ -1,30 +1,23 @@
 from __future__ import annotations
 
 import numpy as np
-from boxes import ORIGIN, PARAMETERS, block, chair, joined, template_mesh
+from ballots import votes_of
+from boxes import PARAMETERS, block, chair, joined, template_mesh
+from planes import on_wing, plane, plane_values
 
-from service.deform.binding import inverse_frames
-from service.deform.groups import hub_parts, mirror_groups
-from service.deform.pieces import Votes, touching_pieces, vote
-from service.deform.proximity import Boxes, box_distances, group_distance
-from service.deform.weld import Welded, weld
+from service.deform.pieces import Votes, touching_pieces
+from service.deform.weld import Welded
 
 W, D = PARAMETERS[[4, 3]]
 
 
 def votes(*meshes: tuple[np.ndarray, np.ndarray]) -> tuple[Welded, Votes]:
-    template = chair()
-    welded = weld(*joined(*meshes))
-    frames = template.frames(PARAMETERS)
-    boxes = Boxes(frames, inverse_frames(frames))
-    x = welded.vertices - ORIGIN
-    u = boxes.local(x)
-    groups = mirror_groups(template)
-    distances = box_distances(u, boxes.sizes)
-    to_group = np.stack([group_distance(x, distances, boxes, g) for g in groups], axis=1)
-    touching = touching_pieces(*welded.boxes())
-    hubs = hub_parts(template)
-    return welded, vote(u, distances, to_group, welded.piece, touching, groups, boxes, hubs)
+    return votes_of(chair(), PARAMETERS, joined(*meshes))
+
+
+def beside_wing(at: np.ndarray, size: tuple[float, float, float]) -> Votes:
+    half = np.array(size) / 2
+    return votes_of(plane(), plane_values(), block(tuple(at - half), tuple(at + half)))[1]
 
 
 def test_each_box_of_the_template_goes_with_its_part():
@@ -79,3 +72,19 @@ def test_boxes_touch_across_a_hair_and_not_across_a_hand():
     low = np.array([[0.0, 0, 0], [0.101, 0, 0], [0.3, 0, 0]])
     touching = touching_pieces(low, low + 0.1)
     assert touching.tolist() == [[True, True, False], [True, True, False], [False, False, True]]
+
+
+def test_a_flap_stretches_with_the_wing_and_an_engine_is_carried():
+    flap = beside_wing(on_wing("left_wing", 0.5, 0.0, -0.4), (0.1, 0.004, 0.02))
+    np.testing.assert_array_equal(flap.keep[0, 1], 1.0)
+    engine = beside_wing(
+        on_wing("left_wing", 0.4, 0.0, 0.5) - np.array([0, 0.04, 0]), (0.05, 0.05, 0.1)
+    )
+    np.testing.assert_array_equal(engine.keep[0, 1], 0.0)
+
+
+def test_a_propellers_blade_is_no_spindle():
+    ahead = np.array([0.0, 0.0, 0.08])
+    blade = beside_wing(on_wing("left_wing", 0.5, 0.0, 0.5) + ahead, (0.12, 0.02, 0.004))
+    assert blade.shares[0].tolist() == [0, 1, 0, 0]
+    assert blade.keep[0, 1, 0] == 0.0

@@ -5,7 +5,7 @@ from boxes import PARAMETERS, chair
 
 from service.deform.binding import inverse_frames
 from service.deform.groups import mirror_groups
-from service.deform.proximity import Boxes, box_distances, group_distance, nearness
+from service.deform.proximity import Boxes, group_distance, nearness
 
 
 def boxes() -> Boxes:
@@ -24,14 +24,12 @@ def test_local_coordinates_are_the_frames_inverse():
 def test_distances_are_zero_inside_and_euclidean_outside():
     w = PARAMETERS[4]
     x = np.array([[0.0, 0.0, 0.0], [w / 2 + 0.03, 0.025 + 0.04, 0.0]])
-    np.testing.assert_allclose(
-        box_distances(boxes().local(x), boxes().sizes)[:, 0], [0, 0.05], atol=1e-6
-    )
+    np.testing.assert_allclose(boxes().distances(boxes().local(x))[:, 0], [0, 0.05], atol=1e-6)
 
 
 def test_between_the_legs_their_group_is_nearer_than_each():
     x = np.array([[0.0, -0.25, 0.2], [2.0, -0.25, 0.2]])
-    distances = box_distances(boxes().local(x), boxes().sizes)
+    distances = boxes().distances(boxes().local(x))
     legs = mirror_groups(chair())[2]
     to_group = group_distance(x, distances, boxes(), legs)
     nearest = distances[:, list(legs.members)].min(axis=1)

@@ -3,12 +3,18 @@ from __future__ import annotations
 import numpy as np
 from boxes import PARAMETERS, chair
 
+from service.deform.binding import inverse_frames
+from service.deform.proximity import Boxes
 from service.deform.seams import flush_seams
 
 
+def boxes() -> Boxes:
+    frames = chair().frames(PARAMETERS)
+    return Boxes(frames, inverse_frames(frames))
+
+
 def test_strips_over_legs_and_back_are_carried_and_the_rest_stretches():
-    template = chair()
-    seams = flush_seams(template, template.frames(PARAMETERS), {})
+    seams = flush_seams(chair(), boxes(), {})
     w, d, lw, ld = PARAMETERS[[4, 3, 7, 6]]
     np.testing.assert_allclose(seams.high[0], [0.5 - lw / w, 0.5, 0.5 - ld / d], atol=1e-6)
     # Behind, the legs and the back are both flush; the deeper one counts.
@@ -17,8 +23,7 @@ def test_strips_over_legs_and_back_are_carried_and_the_rest_stretches():
 
 
 def test_the_seat_then_moves_with_the_leg_below_it():
-    template = chair()
-    seams = flush_seams(template, template.frames(PARAMETERS), {})
+    seams = flush_seams(chair(), boxes(), {})
     lw, w = PARAMETERS[[7, 4]]
     u = np.zeros((4, 6, 3), np.float32)
     u[:, 0, 0] = [0.0, 0.5 - lw / w, 0.5, 0.7]

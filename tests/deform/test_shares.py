@@ -2,10 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 from boxes import PARAMETERS, chair
+from planes import plane, plane_values
 
 from service.deform.binding import inverse_frames
 from service.deform.groups import mirror_groups
+from service.deform.loft import lofts
 from service.deform.proximity import Boxes
+from service.deform.roots import rooted
 from service.deform.shares import Blocks, all_shares
 
 W, LW = PARAMETERS[[4, 7]]
@@ -23,6 +26,19 @@ def test_between_two_legs_the_share_is_linear():
     x = np.stack([across, np.full(9, -0.3), np.full(9, 0.2)], axis=1)
     left = shares(x, False)[:, 3]
     np.testing.assert_allclose(left, np.linspace(0, 1, 9), atol=1e-5)
+
+
+def test_wings_keep_their_own_to_the_root_and_share_what_is_between():
+    f = plane_values()
+    cut, starts = rooted(plane(), f)
+    maps = cut.maps(f)
+    found = lofts(plane(), maps.frames, maps.tapers, starts)
+    boxes = Boxes(maps.frames, inverse_frames(maps.frames), found)
+    across = np.array([-0.4, -0.05, 0.0, 0.0225, 0.05, 0.4])
+    x = np.stack([across, np.full(6, -0.02), np.full(6, 0.05)], axis=1)
+    blocks = Blocks(np.zeros(6, np.int64), np.ptp(x, axis=0)[None], np.array([False]))
+    left = all_shares(boxes.local(x), boxes, mirror_groups(cut), blocks)[:, 1]
+    np.testing.assert_allclose(left, [0, 0, 0.5, 0.75, 1, 1], atol=1e-5)
 
 
 def test_lone_parts_have_all_and_legs_share_one():

@@ -21,7 +21,7 @@ def leaning(shift: float) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_leaning_leg_is_straightened():
     u, faces = leaning(0.1)
-    spine = measure_spine(u, faces, SIZE, NOWHERE)
+    spine = measure_spine(u, faces, SIZE, NOWHERE, 1)
     straight = u[:, [0, 2]] - spine.shift(u)
     np.testing.assert_allclose(np.abs(straight).max(axis=0), 0.5, atol=0.03)
     np.testing.assert_allclose(spine.half, 0.5, atol=0.01)
@@ -29,15 +29,15 @@ def test_a_leaning_leg_is_straightened():
 
 def test_what_straddles_the_mirror_plane_is_no_leg():
     u, faces = leaning(0.0)
-    assert measure_spine(u, faces, SIZE, np.array([0.2, np.nan, np.nan])) is None
+    assert measure_spine(u, faces, SIZE, np.array([0.2, np.nan, np.nan]), 1) is None
 
 
 def test_a_thicker_block_or_none_has_no_spine():
     u, faces = leaning(0.0)
     thick = u * np.float32([4, 1, 4])
-    assert measure_spine(thick, faces, SIZE, NOWHERE) is None
-    assert measure_spine(u, faces[:0], SIZE, NOWHERE) is None
-    assert measure_spine(u, faces, np.array([0.3, 0.4, 0.3]), NOWHERE) is None
+    assert measure_spine(thick, faces, SIZE, NOWHERE, 1) is None
+    assert measure_spine(u, faces[:0], SIZE, NOWHERE, 1) is None
+    assert measure_spine(u, faces, np.array([0.3, 0.4, 0.3]), NOWHERE, 1) is None
 
 
 def test_a_bowed_panel_is_flattened():
@@ -47,5 +47,5 @@ def test_a_bowed_panel_is_flattened():
     welded = weld(x, faces)
     size = np.array([0.4, 0.4, 0.02])
     u = (welded.vertices / size).astype(np.float32)
-    flat = u[:, [2]] - measure_spine(u, welded.faces, size, NOWHERE).shift(u)
+    flat = u[:, [2]] - measure_spine(u, welded.faces, size, NOWHERE, 1).shift(u)
     assert np.abs(flat).max() < 0.8 < np.abs(u[:, 2]).max()

@@ -8,14 +8,16 @@ from numpy.typing import NDArray
 
 from service.deform.binding import Binding
 from service.deform.flips import count_flips
-from service.deform.unfold import unfold
+from service.deform.unfold import FARTHEST, unfold
 
 SIZE = 24
+CELL = 0.01
 
 
 def sheet() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """A flat grid of ``SIZE x SIZE`` unit cells."""
-    x, y = np.meshgrid(np.arange(SIZE + 1.0), np.arange(SIZE + 1.0), indexing="ij")
+    """A flat grid of ``SIZE x SIZE`` cells."""
+    ticks = CELL * np.arange(SIZE + 1)
+    x, y = np.meshgrid(ticks, ticks, indexing="ij")
     corner = np.arange((SIZE + 1) ** 2).reshape(SIZE + 1, SIZE + 1)
     a, b, c, d = (
         m.ravel() for m in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
@@ -43,7 +45,7 @@ def flips(binding: Binding, factor: float) -> int:
 def step(width: float) -> Binding:
     """The right half follows the parameter by `width` cells a unit, the left half does not."""
     vertices, _ = sheet()
-    return bound(np.where(vertices[:, 0] > SIZE / 2, width, 0.0))
+    return bound(np.where(vertices[:, 0] > CELL * SIZE / 2, CELL * width, 0.0))
 
 
 F = np.ones(2)
@@ -65,9 +67,19 @@ def test_the_repair_stays_near_the_fold_and_in_its_column() -> None:
     after = unfold(before, vertices, faces, F, [0])
     changed = (after.jacobian != before.jacobian).any(axis=1)
     assert not changed[:, 1].any()
-    far = np.abs(vertices[:, 0] - SIZE / 2) > 10
+    far = np.abs(vertices[:, 0] - CELL * SIZE / 2) > 10 * CELL
     assert changed[:, 0].any()
     assert not changed[far].any()
+
+
+def test_no_vertex_is_moved_far_to_even_a_fold_out() -> None:
+    vertices, faces = sheet()
+    vertices *= 20.0
+    before = step(4.0)
+    before = replace(before, jacobian=20.0 * before.jacobian)
+    after = unfold(before, vertices, faces, F, [0])
+    moved = 0.4 * np.abs(after.jacobian - before.jacobian)
+    assert 0.0 < moved.max() <= FARTHEST + 1e-6
 
 
 def test_what_does_not_fold_is_left_alone() -> None:

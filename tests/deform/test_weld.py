@@ -22,6 +22,17 @@ def test_a_vertex_that_two_fans_share_joins_them():
     assert welded.pieces == 1
 
 
+def test_triangles_of_their_own_are_joined_along_edges_and_not_at_corners():
+    vertices, faces = joined(
+        block((0.0, 0.0, 0.0), (0.1, 0.1, 0.1), cells=2),
+        block((0.1, 0.1, 0.1), (0.2, 0.2, 0.2), cells=2),
+    )
+    soup = np.arange(3 * len(faces)).reshape(-1, 3)
+    welded = weld(vertices[faces].reshape(-1, 3), soup)
+    assert welded.pieces == 2
+    assert len(welded.vertices) == 52
+
+
 def test_boxes_bound_the_pieces_and_strays_are_a_piece():
     vertices, faces = block((0.0, 0.0, 0.0), (0.1, 0.2, 0.3), cells=1)
     welded = weld(np.concatenate([vertices, [[2.0, 2.0, 2.0]]]), faces)
