@@ -9,15 +9,15 @@ import numpy as np
 from model_export.realistic import RealisticShape
 from service.encode.estimate import estimate
 from service.encode.model import Model
-from service.encode.recognition import roughly
 from service.mesh.formats import read_mesh
 from service.mesh.frame import CANONICAL
 from service.mesh.surface import Samples, sample_surface
 
-USUAL, LIMIT = 75, 95
-"""Percentiles of the shapes' distances: taken at once in their first orientation; half a score."""
-DRAWN = 3.0
-"""How much farther real shapes lie than noise-free template shapes, where there are none to see."""
+LIMIT = 95
+"""Percentage of ordinary shapes that score at least a half by each measure."""
+DRAWN_FARTHER, DRAWN_ODDS = 3.0, 3.0
+"""How much farther real shapes lie than noise-free template shapes, and how much lower their odds
+are, where there are none to see."""
 
 
 def calibrate(
@@ -27,17 +27,19 @@ def calibrate(
 
     Args:
         model: the category; its card need not have a calibration yet.
-        shapes: ordinary real shapes, canonically oriented; may be none.
+        shapes: ordinary real shapes, canonically oriented; may be none.  Odds are taken from those
+            held out, since a discriminator is too sure of what it has learned.
         drawn: samples of template shapes, for a category without real ones.
     """
     samples = [_samples(model, shape) for shape in shapes] or list(drawn)
-    factor = 1.0 if shapes else DRAWN
-    rough = [roughly(model, s, CANONICAL).estimate.distance for s in samples]
-    full = [estimate(model, s).distance for s in samples]
+    unseen = [s for s, shape in zip(samples, shapes, strict=False) if shape.held_out] or samples
+    distances = [estimate(model, s).distance for s in samples]
+    odds = [model.discriminator.odds(s.points, [CANONICAL])[0] for s in unseen]
+    farther, lower = (1.0, 0.0) if shapes else (DRAWN_FARTHER, DRAWN_ODDS)
     return {
         "shapes": len(shapes),
-        "usual_distance": round(factor * float(np.percentile(rough, USUAL)), 5),
-        "limit_distance": round(factor * float(np.percentile(full, LIMIT)), 5),
+        "limit_distance": round(farther * float(np.percentile(distances, LIMIT)), 5),
+        "limit_odds": round(float(np.percentile(odds, 100 - LIMIT)) - lower, 3),
     }
 
 

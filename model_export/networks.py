@@ -1,12 +1,16 @@
-"""The point encoder: PointNet without transforms (section 4.1; Qi et al., CVPR 2017)."""
+"""Encoder and discriminator: PointNets without transforms (section 4.1; Qi et al., CVPR 2017)."""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
+
+Network = TypeVar("Network", bound=nn.Module)
 
 
 class PointEncoder(nn.Module):
@@ -54,14 +58,41 @@ def _layers(widths: Sequence[int]) -> nn.Sequential:
     return nn.Sequential(*blocks)
 
 
-def fold_batch_norm(encoder: PointEncoder) -> PointEncoder:
+class Discriminator(nn.Module):
+    """Tells clouds of a category that stand upright and face the front from all others.
+
+    A PointNet in two rounds: the second sees each point beside the maximum of the first, so that a
+    point can mean something else in another shape.
+    """
+
+    def __init__(
+        self,
+        first: Sequence[int] = (64, 64),
+        second: Sequence[int] = (128, 256),
+        head: Sequence[int] = (256, 64),
+    ) -> None:
+        """Widths of the layers of both rounds and of the hidden ones after the pool."""
+        super().__init__()
+        self.first = _layers([3, *first])
+        self.second = _layers([2 * first[-1], *second])
+        self.head = nn.Sequential(*_layers([2 * second[-1], *head]), nn.Linear(head[-1], 1))
+
+    def forward(self, points: Tensor) -> Tensor:
+        """``[B, n, 3]`` normalised clouds to ``[B]`` log odds."""
+        count, size, _ = points.shape
+        near = self.first(points.reshape(count * size, 3)).reshape(count, size, -1)
+        context = near.amax(dim=1, keepdim=True).expand(-1, size, -1)
+        both = torch.cat([near, context], dim=2)
+        far = self.second(both.reshape(count * size, -1)).reshape(count, size, -1)
+        pooled = torch.cat([far.amax(dim=1), far.mean(dim=1)], dim=1)
+        return self.head(pooled)[:, 0].float()
+
+
+def fold_batch_norm(network: Network) -> Network:
     """The same function in evaluation mode, with each normalisation folded into its layer."""
-    folded = PointEncoder.__new__(PointEncoder)
-    nn.Module.__init__(folded)
-    folded.shared = _fold(encoder.shared)
-    folded.head = _fold(encoder.head)
-    folded.register_buffer("mean", encoder.mean.clone())
-    folded.register_buffer("spread", encoder.spread.clone())
+    folded = copy.deepcopy(network)
+    for name, layers in network.named_children():
+        setattr(folded, name, _fold(layers))
     return folded.eval()
 
 

@@ -14,13 +14,14 @@ from service.encode.model import Model
 from service.encode.recognition import Candidate
 from service.mesh.meshfile import MeshFile
 from service.requests import UNITS, Upload
+from service.sizes import size_warning
 
 Array = NDArray[np.float64]
 
-CLOSE_CALL = 1.1
-"""Two orientations whose fits are within this factor of each other are a close call."""
-PLAUSIBLE = (0.1, 100.0)
-"""Sizes in metres outside of which a unit must be wrong."""
+CLOSE_CALL = 0.5
+"""Readings at least so likely as this share of the answer's are close calls."""
+IN_DISTRIBUTION = 0.5
+"""Least score of what is like the category's shapes."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,11 @@ class Inference:
         return self.best.model
 
     @property
+    def in_distribution(self) -> bool:
+        """Whether it looks and fits like one of its category."""
+        return self.best.score >= IN_DISTRIBUTION
+
+    @property
     def scale(self) -> float:
         """Normalised length per reported length."""
         return self.best.estimate.normalization.scale / self.unit_scale
@@ -78,15 +84,17 @@ class Inference:
     def report(self) -> dict[str, Any]:
         """The answer to `POST /infer`."""
         best, fit = self.best, self.best.estimate
-        named = zip(self.model.template.names, self.parameters, fit.sigma / self.scale, strict=True)
+        template = self.model.template
+        columns = (self.parameters, fit.sigma / self.scale, template.public)
+        rows = zip(template.names, *columns, strict=True)
         derived = self.dimensions().derived(self.parameters)
-        score = self.model.score(fit.distance)
         return {
             "mesh_id": self.upload.mesh_id,
             "category": self.model.name,
             "parameters": {
                 name: {"value": float(value), "sigma": float(sigma), "unit": self.unit}
-                for name, value, sigma in named
+                for name, value, sigma, seen in rows
+                if seen
             },
             "derived": {n: {"value": v, "unit": self.unit} for n, v in derived.items()},
             "frame": {
@@ -94,18 +102,21 @@ class Inference:
                 "front": best.orientation.front,
                 "scale": fit.normalization.scale,
                 "center": (fit.normalization.center @ best.orientation.rotation).tolist(),
+                "rotation": best.orientation.rotation.tolist(),
+                "lean": best.orientation.degrees,
             },
             "fit": {
                 "distance": fit.distance,
                 "encoder_distance": fit.encoder_distance,
-                "in_distribution": score >= 0.5,
-                "score": score,
+                "in_distribution": self.in_distribution,
+                "score": best.score,
                 "candidates": [
                     {
                         "category": candidate.model.name,
                         "up": candidate.orientation.up,
                         "front": candidate.orientation.front,
                         "distance": candidate.estimate.distance,
+                        "probability": candidate.probability,
                     }
                     for candidate in self.candidates
                 ],
@@ -117,22 +128,54 @@ class Inference:
     @cached_property
     def warnings(self) -> list[str]:
         """What the client should know."""
-        warnings = []
-        ranks = [candidate.rank for candidate in self.candidates if candidate.model is self.model]
-        if len(ranks) > 1 and ranks[1] < CLOSE_CALL * ranks[0]:
-            other = self.candidates[1].orientation
-            warnings.append(
-                f"orientation is a close call: up={other.up}, front={other.front} fits nearly "
-                "as well; say up and front to be sure"
-            )
-        if self.model.score(self.best.estimate.distance) < 0.5:
-            warnings.append(
-                f"this does not look like a {self.model.name}; its parameters may mean little"
-            )
-        size = float(np.ptp(self.mesh.vertices, axis=0).max()) * self.unit_scale * UNITS[self.unit]
-        if not PLAUSIBLE[0] < size < PLAUSIBLE[1]:
-            warnings.append(
-                f"the mesh is {size:.3g} m long if its unit is {self.unit}; "
-                "say units to correct that"
-            )
-        return warnings
+        found = (
+            self._close_call(),
+            self._strange(),
+            self._lean(),
+            self._inside_out(),
+            self._size(),
+        )
+        return [warning for warning in found if warning]
+
+    def _close_call(self) -> str | None:
+        best, *others = self.candidates
+        close = [c for c in others if c.probability > CLOSE_CALL * best.probability]
+        if not close:
+            return None
+        ways = " or ".join(
+            f"{c.model.name} with up={c.orientation.up}, front={c.orientation.front}" for c in close
+        )
+        return (
+            f"it could also be a {ways}: which is a close call; "
+            "say category, up and front to be sure"
+        )
+
+    def _strange(self) -> str | None:
+        if self.in_distribution:
+            return None
+        return f"this does not look like a {self.model.name}; its parameters may mean little"
+
+    def _lean(self) -> str | None:
+        way = self.best.orientation
+        if not any(way.lean):
+            return None
+        return (
+            f"the mesh leans {way.degrees:.0f} degrees off up={way.up}, front={way.front}; "
+            "parameters are measured, and edits made, along its own axes"
+        )
+
+    def _inside_out(self) -> str | None:
+        if not self.best.estimate.inside_out:
+            return None
+        return (
+            "the faces are wound inside out, as a mirrored mesh's are; it is read as if they were "
+            "not, and answered as it came"
+        )
+
+    def _size(self) -> str | None:
+        return size_warning(
+            self.model.template,
+            self.parameters * UNITS[self.unit],
+            self.mesh.format,
+            self.unit,
+        )

@@ -11,13 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.encode.discriminator import DISCRIMINATOR_SUFFIX, Discriminator
 from service.encode.session import EncoderSession
 from service.errors import ModelFault
 from service.mesh.surface import Normalization, sample_surface
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
 
+SHIPPED = Path(__file__).parent.parent / "models"
+"""The folder of the models that come with the service."""
 GOLDEN_TOLERANCE = 1e-3
+STEEPNESS = 4
+"""How fast a score falls with the distance."""
 SMALLEST = 1e-3
 """Least length in the normalised frame, where the shape has radius 0.6."""
 
@@ -33,6 +38,7 @@ class Model:
         self.digest: str = card["digest"]
         self._path = path
         self._session = EncoderSession(path, threads)
+        self.discriminator = Discriminator(path.with_suffix(DISCRIMINATOR_SUFFIX), threads)
 
     @property
     def points(self) -> int:
@@ -44,38 +50,41 @@ class Model:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Parameters ``[d]`` and translation ``[3]`` of a normalised cloud ``[points, 3]``.
 
-        Lengths are kept above `SMALLEST`, so that no size is negative.
+        Sizes are kept above `SMALLEST`; signed offsets are as they come.
         """
         outputs = self._session.run(points)
         size = len(self.template.parameters)
-        return np.maximum(outputs[:size], SMALLEST), outputs[size:]
+        return positive(self.template, outputs[:size]), outputs[size:]
 
     @property
-    def usual_distance(self) -> float:
-        """Roughly refined `surface_distance` that most of the category's shapes stay below."""
-        return float(self.card["calibration"]["usual_distance"])
+    def limit_distance(self) -> float:
+        """`surface_distance` that 95 % of the category's ordinary shapes stay below."""
+        return float(self.card["calibration"]["limit_distance"])
 
-    def score(self, distance: float) -> float:
-        """How much a fit's distance looks like one of the category, from 1 down to 0.
+    @property
+    def limit_odds(self) -> float:
+        """Log odds that 95 % of them exceed."""
+        return float(self.card["calibration"]["limit_odds"])
 
-        1/2 at the distance that 95 % of the category's ordinary shapes stay below.
+    def score(self, distance: float, odds: float) -> float:
+        """How much a fitted shape is like the category's, from 1 down to 0.
+
+        The lesser of two scores, of the fit's distance and of the discriminator's log odds: each is
+        1/2 at its limit.
         """
-        limit = float(self.card["calibration"]["limit_distance"])
-        return float(1.0 / (1.0 + (distance / limit) ** 4))
+        near = 1.0 / (1.0 + (distance / self.limit_distance) ** STEEPNESS)
+        alike = 1.0 / (1.0 + np.exp(self.limit_odds - odds))
+        return float(min(near, alike))
 
     def verify(self) -> None:
-        """Check the file's digest, and a golden request against its recorded answer.
+        """Check the files' digests, and a golden request against its recorded answer.
 
         Raises:
             ModelFault: when either differs.
         """
-        digest = file_digest(self._path)
-        if digest != self.digest:
-            raise ModelFault(
-                "model_digest",
-                f"{self._path.name} is {digest}, its card says {self.digest}",
-                "Install the model file and its card from the same export.",
-            )
+        discriminator = self._path.with_suffix(DISCRIMINATOR_SUFFIX)
+        _require_digest(self._path, self.digest)
+        _require_digest(discriminator, self.card["discriminator"]["digest"])
         answer = self._session.run(golden_cloud(self.template, self.points))
         golden = np.array(self.card.get("golden", []))
         gap = float(np.abs(answer - golden).max()) if golden.shape == answer.shape else np.inf
@@ -99,6 +108,7 @@ class Model:
                 *(
                     _entry(p.name, p.label, p.group, (p.low, p.high), p.typical, False, p.paper)
                     for p in template.parameters
+                    if not p.nuisance
                 ),
                 *(
                     _entry(d.name, d.label, d.group, d.typical, d.typical, True, None)
@@ -131,6 +141,21 @@ def _entry(
     }
 
 
+def positive(template: AffineTemplate, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Parameters ``[d]`` with each size no smaller than `SMALLEST`; signed ones stay."""
+    return np.where(template.signed, parameters, np.maximum(parameters, SMALLEST))
+
+
+def _require_digest(path: Path, expected: str) -> None:
+    digest = file_digest(path)
+    if digest != expected:
+        raise ModelFault(
+            "model_digest",
+            f"{path.name} is {digest}, its card says {expected}",
+            "Install the model files and their card from the same export.",
+        )
+
+
 def golden_cloud(template: AffineTemplate, points: int) -> NDArray[np.float32]:
     """A fixed cloud: the template in the middle of its ranges, sampled with a fixed seed."""
     vertices = template.decode((template.low + template.high) / 2)
@@ -151,17 +176,37 @@ def load_models(directory: Path, threads: int = 1) -> dict[str, Model]:
     Raises:
         ModelFault: for a card, network or template that can't be read.
     """
-    models: dict[str, Model] = {}
-    for path in sorted(directory.glob("*.json")):
-        own = path.with_suffix(".yaml")
-        try:
-            card = json.loads(path.read_text("utf-8"))
-            template = load_template(own if own.is_file() else str(card["name"]))
-            models[card["name"]] = Model(card, template, path.with_suffix(".onnx"), threads)
-        except (OSError, ValueError, KeyError, TypeError) as error:
+    models = (load_model(path, threads) for path in sorted(directory.glob("*.json")))
+    return {model.name: model for model in models}
+
+
+def load_model(path: Path, threads: int = 1) -> Model:
+    """The model of a card, with its network and its own template, if any, beside it.
+
+    Raises:
+        ModelFault: for a card, network or template that can't be read, or a template that is not
+            the one that the card speaks of.
+    """
+    own = path.with_suffix(".yaml")
+    try:
+        card = json.loads(path.read_text("utf-8"))
+        template = load_template(template_source(path, card["name"]))
+        if own.is_file() and card.get("template_digest", file_digest(own)) != file_digest(own):
             raise ModelFault(
-                "model_unreadable",
-                f"{path.name} can't be loaded: {error}",
-                "Export the model again, or remove it from the models folder.",
-            ) from error
-    return models
+                "template_digest",
+                f"{own.name} is not the template that {path.name} was trained on",
+                "Train the changed template, or put back the one from the same export.",
+            )
+        return Model(card, template, path.with_suffix(".onnx"), threads)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ModelFault(
+            "model_unreadable",
+            f"{path.name} can't be loaded: {error}",
+            "Export the model again, or remove it from the models folder.",
+        ) from error
+
+
+def template_source(card: Path, name: str) -> str | Path:
+    """A model's template: the file beside its card, else the built-in of its name."""
+    own = card.with_suffix(".yaml")
+    return own if own.is_file() else name

@@ -1,4 +1,4 @@
-"""Which category and which way up: the best fit among models and axis-aligned orientations."""
+"""Which category, and which way up: discriminators rank the readings, fits settle close ones."""
 
 from __future__ import annotations
 
@@ -6,24 +6,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from service.encode.estimate import Estimate, estimate
-from service.encode.model import Model
-from service.encode.refine import Settings
+from service.encode.model import STEEPNESS, Model
+from service.encode.refine import STANDARD, Settings
+from service.encode.straighten import leans
 from service.mesh.frame import CANONICAL, Orientation
-from service.mesh.surface import Normalization, Samples, sample_surface
+from service.mesh.surface import Normalization, Samples
 
+CUSTOM = {CANONICAL: 3.0, Orientation("+z", "-y"): 1.5}
+"""How much likelier than others the orientations are that most files keep to: glTF's, Blender's.
+They decide where a shape looks the same from several sides."""
+DECIDED = 0.97
+"""Readings are fitted until so much of the probability is seen to,"""
 FINALISTS = 4
-"""How many of the encoder's best orientations are refined, roughly, before one is chosen."""
-PRIOR = 0.9
-"""The canonical orientation wins when its distance times this is the least: files mostly keep to
-the convention, and near-symmetric shapes fit several ways."""
-PROBES = 500
-"""Points that the first ranking looks at."""
+"""but no more than these."""
+STRAIGHTER = 1.05
+"""A lean is taken out where that shortens the fit's distance to this share or less."""
+LISTED = 3
+"""Readings that are told of at least, where there are so many."""
 ROUGH = Settings(iterations=8, template_points=600)
-"""Enough refinement to tell orientations apart; it sees every third sample."""
+"""Enough refinement to tell readings apart; it sees every third sample."""
 
 
 @dataclass(frozen=True)
@@ -34,19 +37,22 @@ class Candidate:
         model: the category.
         orientation: the upload's up and front.
         samples: the upload's samples, turned to the canonical frame.
-        estimate: of the answer as asked for; of the others, roughly refined.
+        odds: the discriminator's log odds.
+        probability: of this reading among all that were asked for.
+        estimate: of the answer as asked for; of the others a rough one.
     """
 
     model: Model
     orientation: Orientation
     samples: Samples
+    odds: float
+    probability: float
     estimate: Estimate
 
     @property
-    def rank(self) -> float:
-        """What the choice is made by: smaller is better."""
-        prior = PRIOR if self.orientation == CANONICAL else 1.0
-        return self.estimate.distance * prior / self.model.usual_distance
+    def score(self) -> float:
+        """How much it looks and fits like one of its category."""
+        return self.model.score(self.estimate.distance, self.odds)
 
 
 def turned(samples: Samples, orientation: Orientation) -> Samples:
@@ -69,55 +75,81 @@ def recognise(
     Args:
         models: the categories it may be of.
         samples: the upload's samples in its own frame, by cloud size.
-        orientations: those it may have, the canonical one first.
-        refined: refine the answer.  To choose between orientations the best few are refined
-            roughly, whatever this says.
+        orientations: those it may have.
+        refined: refine the answer.  To choose between readings the best few are refined roughly,
+            whatever this says.
 
     Returns:
-        At least one candidate for each model; the first is the answer.
+        At least one candidate; the first is the answer.
     """
-    if len(models) == len(orientations) == 1:
-        own = turned(samples[models[0].points], orientations[0])
-        return [Candidate(models[0], orientations[0], own, estimate(models[0], own, refined))]
-    candidates = [
-        candidate
-        for model in models
-        for candidate in _search(model, samples[model.points], orientations)
-    ]
-    ranked = sorted(candidates, key=lambda candidate: candidate.rank)
-    best = ranked[0]
+    views = _views(models, samples, orientations)
+    finalists = 1 + int(np.searchsorted(np.cumsum([v.probability for v in views]), DECIDED))
+    finalists = min(finalists, FINALISTS, len(views))
+    if finalists == 1:
+        listed = [view.candidate(refined=False) for view in views[:LISTED]]
+    else:
+        fitted = _weighed([view.candidate(True, ROUGH, 3) for view in views[:finalists]])
+        listed = [*fitted, *(view.candidate(refined=False) for view in views[finalists:LISTED])]
+    best = straightened(listed[0])
     answer = estimate(best.model, best.samples, refined)
-    return [replace(best, estimate=answer), *ranked[1:]]
+    return [replace(best, estimate=answer), *listed[1:]]
 
 
-def _search(model: Model, samples: Samples, orientations: Sequence[Orientation]) -> list[Candidate]:
-    """Roughly refined candidates for the best few orientations.
+def straightened(candidate: Candidate) -> Candidate:
+    """The candidate without its lean, if it has one and fits clearly better without."""
+    model, samples = candidate.model, candidate.samples
+    points = Normalization.of(samples.points).apply(samples.points)
+    best, least = candidate, np.inf
+    for lean in leans(points, model.template.stands):
+        if not np.isfinite(least):
+            least = STRAIGHTER * estimate(model, samples, True, ROUGH, stride=3).distance
+        turn = CANONICAL.leaning(lean)
+        own = turned(samples, turn)
+        fit = estimate(model, own, True, ROUGH, stride=3)
+        if fit.distance < least:
+            orientation = candidate.orientation.leaning(lean)
+            best, least = replace(candidate, orientation=orientation, samples=own), fit.distance
+    return best
 
-    A first orientation that fits as well as shapes of the category usually do is taken at once.
-    """
-    first = roughly(model, samples, orientations[0])
-    if len(orientations) == 1 or first.estimate.distance <= model.usual_distance:
-        return [first]
-    others = sorted(orientations[1:], key=lambda o: _encoded_distance(model, samples, o))
-    return [first, *(roughly(model, samples, other) for other in others[:FINALISTS])]
+
+@dataclass(frozen=True)
+class _View:
+    """A reading that has not been fitted yet; its samples are in the upload's own frame."""
+
+    model: Model
+    orientation: Orientation
+    samples: Samples
+    odds: float
+    probability: float
+
+    def candidate(self, refined: bool, settings: Settings = STANDARD, stride: int = 1) -> Candidate:
+        own = turned(self.samples, self.orientation)
+        fit = estimate(self.model, own, refined, settings, stride)
+        return Candidate(self.model, self.orientation, own, self.odds, self.probability, fit)
 
 
-def roughly(model: Model, samples: Samples, orientation: Orientation) -> Candidate:
-    """A candidate refined just enough to be compared."""
-    own = turned(samples, orientation)
-    return Candidate(model, orientation, own, estimate(model, own, True, ROUGH, stride=3))
+def _views(
+    models: Sequence[Model], samples: dict[int, Samples], orientations: Sequence[Orientation]
+) -> list[_View]:
+    """All readings with their probabilities, the likeliest first."""
+    odds = [m.discriminator.odds(samples[m.points].points, orientations) for m in models]
+    customary = np.log([CUSTOM.get(way, 1.0) for way in orientations])
+    worth = np.stack([o - m.limit_odds for o, m in zip(odds, models, strict=True)]) + customary
+    share = np.exp(worth - worth.max())
+    share /= share.sum()
+    views = [
+        _View(model, way, samples[model.points], float(odds[m][w]), float(share[m, w]))
+        for m, model in enumerate(models)
+        for w, way in enumerate(orientations)
+    ]
+    return sorted(views, key=lambda view: -view.probability)
 
 
-def _encoded_distance(model: Model, samples: Samples, orientation: Orientation) -> float:
-    """Mean two-way distance of a few points for the encoder's answer alone."""
-    points = turned(samples, orientation).points
-    points = Normalization.of(points).apply(points)
-    parameters, translation = model.encode(points)
-    template = model.template
-    vertices: NDArray[np.float64] = template.decode(parameters) + translation
-    visible = template.faces[~template.hidden]
-    fitted = sample_surface(vertices, visible, PROBES, np.random.default_rng(2)).points
-    # Samples come in the order of the faces: every so-many-th is a fair draw.
-    probes = points[:: max(1, len(points) // PROBES)]
-    there = cKDTree(probes).query(fitted)[0].mean()
-    return float(there + cKDTree(fitted).query(probes)[0].mean())
+def _weighed(candidates: list[Candidate]) -> list[Candidate]:
+    """Candidates with their probabilities after their fits were seen, the likeliest first."""
+    ratio = [c.model.limit_distance / max(c.estimate.distance, 1e-9) for c in candidates]
+    prior = np.array([candidate.probability for candidate in candidates])
+    share = prior * np.array(ratio) ** STEEPNESS
+    share *= prior.sum() / share.sum()
+    weighed = [replace(c, probability=float(p)) for c, p in zip(candidates, share, strict=True)]
+    return sorted(weighed, key=lambda candidate: -candidate.probability)

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from service import deadline
 from service.encode.distance import Cloud
-from service.encode.model import SMALLEST
+from service.encode.model import positive
 from service.mesh.surface import sample_surface
 from service.template.affine import AffineTemplate
 
@@ -81,7 +82,7 @@ def refine(
         settings: of the optimisation.
 
     Returns:
-        The fitted parameters, no smaller than `SMALLEST`.
+        The fitted parameters, sizes no smaller than `SMALLEST`.
     """
     start = np.concatenate([parameters, translation])
     moving = _MovingSamples(template, parameters, settings.template_points)
@@ -90,6 +91,7 @@ def refine(
     state = start.copy()
     scales = np.geomspace(settings.coarse, settings.fine, settings.iterations)
     for scale in scales:
+        deadline.check()
         system = _normal_equations(moving, matcher, state, scale, settings.slide)
         prior = settings.pull / spread**2
         hessian = system.hessian + np.diag(prior)
@@ -105,12 +107,12 @@ def refine(
 
 
 def _admissible(template: AffineTemplate, parameters: Array) -> Array:
-    """The nearest parameters, or nearly so, that are positive and keep the template's relations."""
+    """The nearest parameters, or nearly so, with positive sizes that keep the relations."""
     for constant, *row in template.relations:
         lack = -(constant + parameters @ row)
         if lack > 0.0:
             parameters = parameters + np.array(row) * (lack / np.dot(row, row))
-    return np.maximum(parameters, SMALLEST)
+    return positive(template, parameters)
 
 
 SIGMA_SAMPLES = 40

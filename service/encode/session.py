@@ -11,6 +11,50 @@ from numpy.typing import NDArray
 from service.errors import ModelFault
 
 
+def open_session(path: Path, threads: int) -> onnxruntime.InferenceSession:
+    """A session of an ONNX file whose runs take ``threads`` threads.
+
+    Raises:
+        ModelFault: when the file is no network.
+    """
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+    # Spinning wins microseconds and costs whole cores that other requests need.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    # The arena keeps its high-water mark for ever; with few shapes it gains nothing.
+    options.enable_cpu_mem_arena = False
+    options.log_severity_level = 3
+    try:
+        return onnxruntime.InferenceSession(
+            path.read_bytes(), options, providers=["CPUExecutionProvider"]
+        )
+    except Exception as error:
+        raise ModelFault(
+            "model_unreadable",
+            f"{path.name} can't be loaded: {type(error).__name__}",
+            "Export the model again.",
+        ) from error
+
+
+def cloud_size(session: onnxruntime.InferenceSession, path: Path, single: bool) -> int:
+    """Points of the clouds that a network takes: one, or any number of them at a time.
+
+    Raises:
+        ModelFault: when it takes anything else.
+    """
+    shape = session.get_inputs()[0].shape
+    count_fits = len(shape) == 3 and (shape[0] == 1 if single else isinstance(shape[0], str))
+    if not count_fits or shape[2] != 3 or not isinstance(shape[1], int):
+        raise ModelFault(
+            "model_shape",
+            f"{path.name} takes {shape}, not [{'1' if single else 'count'}, points, 3]",
+            "Export the model again.",
+        )
+    return int(shape[1])
+
+
 class EncoderSession:
     """A loaded encoder: one cloud of a fixed size in, ``d + 3`` numbers out."""
 
@@ -23,33 +67,8 @@ class EncoderSession:
         Raises:
             ModelFault: when the file is no such network.
         """
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
-        options.inter_op_num_threads = 1
-        options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
-        # Spinning wins microseconds and costs whole cores that other requests need.
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-        # The arena keeps its high-water mark for ever; with one fixed shape it gains nothing.
-        options.enable_cpu_mem_arena = False
-        options.log_severity_level = 3
-        try:
-            self._session = onnxruntime.InferenceSession(
-                path.read_bytes(), options, providers=["CPUExecutionProvider"]
-            )
-        except Exception as error:
-            raise ModelFault(
-                "model_unreadable",
-                f"{path.name} can't be loaded: {type(error).__name__}",
-                "Export the model again.",
-            ) from error
-        shape = self._session.get_inputs()[0].shape
-        if len(shape) != 3 or shape[0] != 1 or shape[2] != 3 or not isinstance(shape[1], int):
-            raise ModelFault(
-                "model_shape",
-                f"{path.name} takes {shape}, not [1, points, 3]",
-                "Export the model again.",
-            )
-        self.points: int = shape[1]
+        self._session = open_session(path, threads)
+        self.points = cloud_size(self._session, path, single=True)
 
     def run(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """``[points, 3]`` normalised cloud to ``[d + 3]`` outputs."""

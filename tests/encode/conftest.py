@@ -21,6 +21,7 @@ from service.template.loader import load_template
 Array = NDArray[np.float64]
 Labelled = tuple[Cloud, Array, Array]
 WriteNetwork = Callable[..., Path]
+WriteDiscriminator = Callable[[Path], Path]
 
 PLAIN = {
     "back_height": 0.42,
@@ -95,6 +96,37 @@ def write_network() -> WriteNetwork:
             [helper.make_tensor_value_info("points", TensorProto.FLOAT, shape)],
             [helper.make_tensor_value_info("outputs", TensorProto.FLOAT, None)],
             [axes, row],
+        )
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
+        onnx.save(model, path)
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def write_discriminator() -> WriteDiscriminator:
+    """Writes a discriminator of 30 points whose log odds are ten times the largest y, less 2."""
+
+    def write(path: Path) -> Path:
+        initializers = [
+            helper.make_tensor("axes", TensorProto.INT64, [1], [1]),
+            helper.make_tensor("up", TensorProto.INT64, [], [1]),
+            helper.make_tensor("ten", TensorProto.FLOAT, [], [10.0]),
+            helper.make_tensor("two", TensorProto.FLOAT, [], [2.0]),
+        ]
+        nodes = [
+            helper.make_node("ReduceMax", ["views", "axes"], ["largest"], keepdims=0),
+            helper.make_node("Gather", ["largest", "up"], ["height"], axis=1),
+            helper.make_node("Mul", ["height", "ten"], ["tenfold"]),
+            helper.make_node("Sub", ["tenfold", "two"], ["odds"]),
+        ]
+        graph = helper.make_graph(
+            nodes,
+            "discriminator",
+            [helper.make_tensor_value_info("views", TensorProto.FLOAT, ("count", 30, 3))],
+            [helper.make_tensor_value_info("odds", TensorProto.FLOAT, None)],
+            initializers,
         )
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
         onnx.save(model, path)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,16 +27,20 @@ ANSWER = [0.4, 0.04, 0.06, -0.2, 0.5, 0.4, 0.05, 0.0]
 
 
 @pytest.fixture
-def folder(tmp_path: Path, write_network: Any, chair: AffineTemplate) -> Path:
+def folder(
+    tmp_path: Path, write_network: Any, write_discriminator: Any, chair: AffineTemplate
+) -> Path:
     """A models folder with a chair whose network answers `ANSWER`."""
     network = write_network(tmp_path / "chair.onnx", ANSWER, (1, 100, 3))
+    discriminator = write_discriminator(tmp_path / "chair.discriminator.onnx")
     golden = EncoderSession(network).run(golden_cloud(chair, 100))
     card = {
         "name": "chair",
         "version": "1.2.3",
         "digest": file_digest(network),
         "golden": golden.tolist(),
-        "calibration": {"usual_distance": 0.01, "median_distance": 0.01, "limit_distance": 0.03},
+        "discriminator": {"digest": file_digest(discriminator)},
+        "calibration": {"limit_distance": 0.03, "limit_odds": 1.0},
     }
     (tmp_path / "chair.json").write_text(json.dumps(card), "utf-8")
     return tmp_path
@@ -69,6 +74,23 @@ def test_encoding_splits_the_answer_and_keeps_sizes_positive(folder: Path) -> No
     np.testing.assert_allclose(translation, cloud.max(axis=0), rtol=1e-6)
 
 
+def test_signed_offsets_stay_as_the_network_says(folder: Path, chair: AffineTemplate) -> None:
+    model = load_models(folder)["chair"]
+    offsets = {"seat_depth": -0.3, "leg_width": 0.0}
+    parameters = tuple(replace(p, low=offsets.get(p.name, p.low)) for p in chair.parameters)
+    model.template = replace(chair, parameters=parameters)
+    answer, _ = model.encode(np.zeros((100, 3)))
+    np.testing.assert_allclose(answer, ANSWER, rtol=1e-6)
+
+
+def test_nuisance_parameters_are_not_described(folder: Path, chair: AffineTemplate) -> None:
+    model = load_models(folder)["chair"]
+    parameters = tuple(replace(p, nuisance="leg" in p.name) for p in chair.parameters)
+    model.template = replace(chair, parameters=parameters)
+    offered = [e["name"] for e in model.describe()["parameters"] if not e["derived"]]
+    assert offered == [name for name in chair.names if "leg" not in name]
+
+
 def test_a_template_beside_the_card_is_the_categorys(folder: Path) -> None:
     source = Path(service.template.__file__).parent / "chair.yaml"
     text = source.read_text("utf-8").replace("label: Chair", "label: Throne")
@@ -91,6 +113,14 @@ def test_an_altered_file_is_noticed(folder: Path, write_network: Any) -> None:
         load_models(folder)["chair"].verify()
     assert caught.value.code == "model_digest"
     assert "chair.onnx is sha256-" in caught.value.detail
+
+
+def test_an_altered_discriminator_is_noticed(folder: Path) -> None:
+    rewrite(folder, discriminator={"digest": "sha256-00"})
+    with pytest.raises(ModelFault) as caught:
+        load_models(folder)["chair"].verify()
+    assert caught.value.code == "model_digest"
+    assert "chair.discriminator.onnx is sha256-" in caught.value.detail
 
 
 @pytest.mark.parametrize("index", [0, 3, 10])
@@ -139,20 +169,29 @@ def test_a_card_that_cannot_be_used_is_refused(folder: Path, fault: str) -> None
     assert caught.value.detail.startswith("chair.json can't be loaded")
 
 
-def test_a_card_without_its_network_is_refused(folder: Path) -> None:
-    (folder / "chair.onnx").unlink()
+@pytest.mark.parametrize("name", ["chair.onnx", "chair.discriminator.onnx"])
+def test_a_card_without_its_networks_is_refused(folder: Path, name: str) -> None:
+    (folder / name).unlink()
     with pytest.raises(ModelFault) as caught:
         load_models(folder)
-    assert "chair.onnx" in caught.value.detail
+    assert name in caught.value.detail
 
 
-def test_the_score_falls_from_one_past_a_half_at_the_limit(folder: Path) -> None:
+def test_the_score_falls_with_the_distance_past_a_half_at_the_limit(folder: Path) -> None:
     score = load_models(folder)["chair"].score
-    assert score(0.0) == 1.0
-    assert score(0.03) == pytest.approx(0.5)
+    assert score(0.0, 50.0) == 1.0
+    assert score(0.03, 50.0) == pytest.approx(0.5)
     distances = np.linspace(0, 0.2, 50)
-    assert (np.diff([score(d) for d in distances]) < 0).all()
-    assert score(0.2) < 0.01
+    assert (np.diff([score(d, 50.0) for d in distances]) < 0).all()
+    assert score(0.2, 50.0) < 0.01
+
+
+def test_the_score_falls_with_the_odds_past_a_half_at_the_limit(folder: Path) -> None:
+    score = load_models(folder)["chair"].score
+    assert score(0.0, 1.0) == pytest.approx(0.5)
+    assert score(0.0, -8.0) < 0.001
+    assert score(0.03, 1.5) == pytest.approx(0.5)
+    assert score(0.1, -8.0) == pytest.approx(score(0.0, -8.0))
 
 
 def test_the_description_names_every_parameter_and_dimension(folder: Path) -> None:
@@ -175,7 +214,7 @@ def test_the_description_names_every_parameter_and_dimension(folder: Path) -> No
 def test_the_installed_model_is_whole(chair_model: Model, chair: AffineTemplate) -> None:
     chair_model.verify()
     assert chair_model.points == chair.points == 2840
-    assert chair_model.usual_distance > 0
+    assert 0.02 < chair_model.limit_distance < 0.06
 
 
 def test_the_installed_model_tells_chairs_apart(chair_model: Model, labelled: Any) -> None:

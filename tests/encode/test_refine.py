@@ -9,7 +9,9 @@ import pytest
 from service.encode.distance import Cloud
 from service.encode.model import SMALLEST
 from service.encode.refine import STANDARD, Settings, refine
+from service.mesh.surface import Normalization, sample_surface
 from service.template.affine import AffineTemplate
+from service.template.loader import load_template
 
 
 def ordinary(chair: AffineTemplate, seed: int) -> np.ndarray:
@@ -103,6 +105,25 @@ def test_fits_keep_the_relations_of_the_template(
     assert (chair.relations @ [1.0, *fit.parameters] > -1e-6).all()
     width = chair.names.index("seat_width")
     assert fit.parameters[width] == pytest.approx(f[width], abs=0.02)
+
+
+def test_signed_offsets_are_fitted_below_zero() -> None:
+    template = load_template("airplane")
+    names = template.names
+    f = (template.low + template.high) / 2
+    f[names.index("wing_sweep")], f[names.index("wing_height")] = -0.05, -0.03
+    f[names.index("wing_dihedral")] = -0.02
+    visible = template.faces[~template.hidden]
+    samples = sample_surface(template.decode(f), visible, 2750, np.random.default_rng(0))
+    normalization = Normalization.of(samples.points)
+    cloud = Cloud(normalization.apply(samples.points), samples.normals)
+    true, t = f * normalization.scale, -normalization.center * normalization.scale
+    start = true + np.where(template.signed, 0.03, 0.0)
+    fit = refine(template, start, t, cloud)
+    offsets = ["wing_sweep", "wing_height", "wing_dihedral"]
+    index = [names.index(name) for name in offsets]
+    assert (fit.parameters[index] < 0).all()
+    np.testing.assert_allclose(fit.parameters[index], true[index], atol=0.01)
 
 
 def test_a_chair_with_all_its_points_on_one_side_is_no_fault(

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from model_export.calibrate import DRAWN, calibrate
+from model_export.calibrate import DRAWN_FARTHER, DRAWN_ODDS, calibrate
 from model_export.realistic import find_shapes
 from service.encode.model import Model, load_models
+from service.mesh.frame import CANONICAL
 from service.mesh.surface import Samples, sample_surface
 
 MODELS = Path(__file__).parents[2] / "service" / "models"
@@ -31,17 +32,18 @@ def drawn(model: Model, count: int, noise: float = 0.0) -> list[Samples]:
     return found
 
 
-def test_without_real_shapes_distances_of_drawn_ones_are_stretched(model: Model) -> None:
-    card = calibrate(model, [], drawn(model, 3))
+def test_without_real_shapes_the_limits_of_drawn_ones_are_loosened(model: Model) -> None:
+    shapes = drawn(model, 3)
+    card = calibrate(model, [], shapes)
     assert card["shapes"] == 0
-    assert 0 < card["limit_distance"] < DRAWN * 0.02
-    assert 0 < card["usual_distance"] < DRAWN * 0.02
+    assert 0 < card["limit_distance"] < DRAWN_FARTHER * 0.02
+    least = min(model.discriminator.odds(s.points, [CANONICAL])[0] for s in shapes)
+    assert least - DRAWN_ODDS <= card["limit_odds"] < least - DRAWN_ODDS + 1.0
 
 
-def test_worse_shapes_give_larger_limits(model: Model) -> None:
+def test_worse_shapes_give_looser_limits(model: Model) -> None:
     clean, rough = (calibrate(model, [], drawn(model, 3, noise)) for noise in (0.0, 0.02))
     assert rough["limit_distance"] > 1.5 * clean["limit_distance"]
-    assert rough["usual_distance"] > 1.5 * clean["usual_distance"]
 
 
 def test_real_shapes_come_before_drawn_ones(
@@ -54,3 +56,4 @@ def test_real_shapes_come_before_drawn_ones(
     card = calibrate(model, find_shapes(tmp_path), drawn(model, 2, 0.05))
     assert card["shapes"] == 2
     assert card["limit_distance"] < 0.02
+    assert card["limit_odds"] > 0

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from model_export.networks import PointEncoder, fold_batch_norm
+from model_export.networks import Discriminator, PointEncoder, fold_batch_norm
 
 OUTPUTS = 11
 
@@ -114,3 +114,31 @@ def test_folding_leaves_the_original_as_it_was() -> None:
             weight.zero_()
     folded.mean.zero_()
     assert all(torch.equal(before[name], value) for name, value in network.state_dict().items())
+
+
+def discriminator() -> Discriminator:
+    """One whose normalisations have seen data."""
+    torch.manual_seed(0)
+    network = Discriminator()
+    for _ in range(5):
+        network(clouds(8, 40))
+    return network.eval()
+
+
+def test_a_discriminator_gives_a_number_a_cloud_whatever_the_order_of_points() -> None:
+    network, points = discriminator(), clouds(3, 100)
+    with torch.no_grad():
+        odds = network(points)
+        assert odds.shape == (3,)
+        assert torch.allclose(network(points[:, torch.randperm(100)]), odds, atol=1e-5)
+        assert torch.allclose(network(points[1:2])[0], odds[1], atol=1e-5)
+    assert odds.std() > 1e-3
+
+
+def test_a_folded_discriminator_is_the_same_function() -> None:
+    network, points = discriminator(), clouds(3, 100)
+    folded = fold_batch_norm(network)
+    assert not any(isinstance(layer, nn.BatchNorm1d) for layer in folded.modules())
+    assert any(isinstance(layer, nn.BatchNorm1d) for layer in network.modules())
+    with torch.no_grad():
+        assert torch.allclose(folded(points), network(points), atol=1e-5)

@@ -1,0 +1,69 @@
+"""Whether an upload is as large as its kind is, or its unit must be another one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.requests import METRIC, UNITS
+from service.template.affine import AffineTemplate
+
+Array = NDArray[np.float64]
+
+LENIENT = 2.5
+"""Shapes may be so many times smaller or larger than typical ones without remark."""
+
+
+def size_ratio(template: AffineTemplate, metres: Array) -> float:
+    """How large a shape is beside typical ones: 1 is ordinary, 1000 is millimetres for metres.
+
+    Args:
+        template: the category's.
+        metres: ``[d]`` its parameters.
+    """
+    low, high = np.array([parameter.typical for parameter in template.parameters]).T
+    counted = template.public & (low > 0.0)
+    middle = np.sqrt(np.where(counted, low * high, 1.0))
+    # Large lengths tell the size; thicknesses and signed offsets only the proportions.
+    weight = np.where(counted, middle, 0.0)
+    return float(np.exp(weight @ np.log(np.maximum(metres, 1e-12) / middle) / weight.sum()))
+
+
+def size_warning(template: AffineTemplate, metres: Array, format: str, unit: str) -> str | None:
+    """What to tell a client whose upload is implausibly small or large for its kind.
+
+    Args:
+        template: the category's.
+        metres: ``[d]`` its parameters as the file's unit has them.
+        format: the file's.
+        unit: that the client says, or is taken to say.
+    """
+    spread = max(high / low for low, high in _typical(template)) ** 0.5
+    ratio = size_ratio(template, metres)
+    if 1.0 / (LENIENT * spread) <= ratio <= LENIENT * spread:
+        return None
+    told = "metres" if format in METRIC else unit
+    start = (
+        f"a {template.name} of this size would be {ratio:.2g} times as large as usual, "
+        f"with {told} as the unit of the file"
+    )
+    factor = UNITS["m" if format in METRIC else unit]
+    others = {
+        name: abs(np.log(ratio * length / factor))
+        for name, length in UNITS.items()
+        if length != factor
+    }
+    likely = min(others, key=lambda name: others[name])
+    if others[likely] > np.log(LENIENT * spread):
+        return f"{start}; its scale may be arbitrary: parameters are in {told} all the same"
+    if format in METRIC:
+        return f"{start}; it seems to be in {likely}, but its format's unit is the metre"
+    return f"{start}; it seems to be in {likely}: say units={likely}"
+
+
+def _typical(template: AffineTemplate) -> list[tuple[float, float]]:
+    return [
+        parameter.typical
+        for parameter, counted in zip(template.parameters, template.public, strict=True)
+        if counted and parameter.typical[0] > 0.0
+    ]

@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from service.sizes import size_ratio, size_warning
+from service.template.affine import AffineTemplate
+from service.template.loader import load_template
+
+PLAIN = np.array([0.42, 0.04, 0.06, 0.45, 0.48, 0.40, 0.05, 0.05])
+
+
+@pytest.fixture(scope="module")
+def chair() -> AffineTemplate:
+    return load_template("chair")
+
+
+@pytest.mark.parametrize("scale", [0.3, 1.0, 2.5])
+def test_chairs_of_sensible_sizes_are_passed_over(chair: AffineTemplate, scale: float) -> None:
+    assert size_ratio(chair, PLAIN * scale) == pytest.approx(scale, rel=0.2)
+    assert size_warning(chair, PLAIN * scale, "obj", "m") is None
+    assert size_warning(chair, PLAIN * scale, "glb", "cm") is None
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit", "likely"),
+    [(1000, "m", "mm"), (100, "m", "cm"), (39.4, "m", "in"), (0.01, "cm", "m"), (10, "cm", "mm")],
+)
+def test_the_likelier_unit_is_named(
+    chair: AffineTemplate, scale: float, unit: str, likely: str
+) -> None:
+    warning = size_warning(chair, PLAIN * scale, "obj", unit)
+    assert warning is not None
+    assert warning.endswith(f"it seems to be in {likely}: say units={likely}")
+    assert f"with {unit} as the unit" in warning
+
+
+def test_gltf_is_in_metres_whatever_the_client_says(chair: AffineTemplate) -> None:
+    warning = size_warning(chair, PLAIN * 100, "glb", "cm")
+    assert warning is not None
+    assert warning.endswith("it seems to be in cm, but its format's unit is the metre")
+    assert "with metres as the unit" in warning
+
+
+def test_a_size_that_no_unit_explains_is_told(chair: AffineTemplate) -> None:
+    for scale in (1e-6, 1e6):
+        warning = size_warning(chair, PLAIN * scale, "ply", "m")
+        assert warning is not None
+        assert "arbitrary" in warning
+
+
+def test_signed_and_nuisance_parameters_say_nothing_of_size() -> None:
+    airplane = load_template("airplane")
+    middle = np.array([(p.typical[0] * p.typical[1]) ** 0.5 if p.low > 0 else 0.0
+                       for p in airplane.parameters])  # fmt: skip
+    assert size_ratio(airplane, middle) == pytest.approx(1.0)
+    moved = np.where(airplane.public, middle, -100.0)
+    assert size_ratio(airplane, moved) == pytest.approx(1.0)
