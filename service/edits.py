@@ -47,7 +47,8 @@ def parse_edits(text: str) -> dict[str, Change]:
 def _change(name: str, entry: Any) -> Change:
     if isinstance(entry, dict):
         if len(entry) != 1 or next(iter(entry)) not in KINDS:
-            raise _malformed(name, f"has {sorted(entry)}, not one of set, add, scale")
+            found = repr(", ".join(entry)[:80]) if entry else "nothing"
+            raise _malformed(name, f"has {found}, not one of set, add, scale")
         kind, amount = next(iter(entry.items()))
     else:
         kind, amount = "set", entry

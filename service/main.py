@@ -14,13 +14,15 @@ from threadpoolctl import threadpool_limits
 from service.api import categories, edit, infer, meshes, openapi, probes, problems
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
+from service.api.hangup import can_listen, reload_on_hangup
 from service.api.head import Head
 from service.api.quota import cpu_count
 from service.api.readiness import Readiness
 from service.api.store import MeshStore
 from service.api.trace import Trace
 from service.api.workers import Workers
-from service.encode.model import load_models
+from service.encode.catalog import Catalog
+from service.encode.model import SHIPPED, load_models
 from service.settings import Settings
 
 
@@ -55,9 +57,10 @@ def _context(settings: Settings) -> Context:
     cpus = cpu_count()
     workers = settings.workers or cpus
     # Each worker's inference gets its share of the CPUs.
-    load = partial(load_models, settings.models_dir, max(1, cpus // workers))
-    pool = Workers(workers)
-    return Context(MeshStore(settings.mesh_cache_bytes), Readiness(load, pool), pool)
+    threads = max(1, cpus // workers)
+    catalog = Catalog(partial(load_models, SHIPPED, threads), settings.models_dir, threads)
+    pool = Workers(workers, settings.deadline_seconds)
+    return Context(MeshStore(settings.mesh_cache_bytes), Readiness(catalog.load, pool), pool)
 
 
 @asynccontextmanager
@@ -66,4 +69,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     context: Context = app.state.context
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(context.readiness.start)
+        if can_listen():
+            tasks.start_soon(reload_on_hangup, context.readiness)
         yield
+        tasks.cancel_scope.cancel()

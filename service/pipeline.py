@@ -7,8 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from service import deadline
 from service.deform import blend, paper
 from service.deform.binding import Binding
+from service.deform.followers import following
 from service.deform.unfold import unfold
 from service.edited import Edited, Moved, write_edited
 from service.edits import Change
@@ -43,7 +45,9 @@ def infer(upload: Upload, models: Mapping[str, Model], options: InferOptions) ->
     require_units(options.units)
     ways = orientations(options.up, options.front)
     mesh = read_mesh(upload.data, upload.name, upload.content_type)
+    deadline.check()
     samples = {points: _sample(mesh, points) for points in {model.points for model in chosen}}
+    deadline.check()
     candidates = recognise(chosen, samples, ways, options.refine)
     # glTF is in metres whatever the client's unit; other files are in the unit it names.
     unit_scale = file_unit(mesh.format, options.units) / UNITS[options.units]
@@ -64,21 +68,26 @@ def edit(
     """
     _require_mode(edit_options.mode)
     found = infer(upload, models, options)
+    _require_recognised(found, options.category)
     keep = _anchor(found.model, edit_options.keep)
+    deadline.check()
     binding = _bind(found, edit_options.mode)
+    deadline.check()
     after = found.dimensions(binding.jacobian).after(edits)
     if edit_options.mode == "blend":
         changed = np.flatnonzero(after != found.parameters).tolist()
         fit = found.best.estimate.parameters
         binding = unfold(binding, found.vertices, found.mesh.faces, fit, changed)
     dimensions = found.dimensions(binding.jacobian)
-    after = dimensions.after(edits)
+    outcome = dimensions.outcome(edits, edit_options.strict)
+    after = outcome.parameters
     change = np.where(after == found.parameters, 0.0, (after - found.parameters) * found.scale)
     _, anchor = found.model.template.anchor(keep)
     turn, scale = found.best.orientation, found.best.estimate.normalization.scale
     shift = turn.to_own((binding.displace(change) - anchor @ change) / scale)
     linear = turn.maps_to_own(binding.linear(change))
-    moved = Moved(found, dimensions, after, found.mesh.vertices + shift, linear)
+    deadline.check()
+    moved = Moved(found, dimensions, outcome, found.mesh.vertices + shift, linear)
     return write_edited(moved, edit_options.format)
 
 
@@ -96,6 +105,17 @@ def _categories(models: Mapping[str, Model], category: str) -> list[Model]:
             f"Use one of {', '.join(models)}, or auto.",
         )
     return [models[category]]
+
+
+def _require_recognised(found: Inference, category: str) -> None:
+    """An edit of what is taken for something else would only bend it."""
+    if category == AUTO and not found.in_distribution:
+        raise InvalidRequest(
+            "not_recognised",
+            f"the mesh is most like a {found.model.name}, but does not look like one "
+            f"(score {found.best.score:.2f})",
+            f"Send category={found.model.name} to edit it as one all the same.",
+        )
 
 
 def _require_mode(mode: str) -> None:
@@ -120,11 +140,10 @@ def _anchor(model: Model, keep: str | None) -> str:
 def _bind(found: Inference, mode: str) -> Binding:
     rule = blend.bind if mode == "blend" else paper.bind
     fit = found.best.estimate
-    return rule(
-        found.vertices, found.mesh.faces, found.model.template, fit.parameters, fit.translation
-    )
+    template = following(found.model.template, fit.parameters)
+    return rule(found.vertices, found.mesh.faces, template, fit.parameters, fit.translation)
 
 
 def _sample(mesh: MeshFile, points: int) -> Samples:
     """The same samples for the same mesh, always."""
-    return sample_surface(mesh.vertices, mesh.faces, points, np.random.default_rng(0))
+    return sample_surface(mesh.vertices, mesh.visible, points, np.random.default_rng(0))

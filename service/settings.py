@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, PositiveInt
+from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 MEBIBYTE = 1024 * 1024
@@ -28,8 +28,9 @@ class Settings(BaseSettings):
     port: int = Field(default=8000, ge=0, le=65535)
     """Port to listen on; 0 takes a free one."""
 
-    models_dir: Path = Path(__file__).parent / "models"
-    """Folder of the models: `<category>.onnx` beside `<category>.json`."""
+    models_dir: Path | None = None
+    """Folder of models of your own, as `model_export.export` writes them: served beside the shipped
+    ones, in place of one of the same name. SIGHUP reads it anew."""
 
     max_upload_bytes: PositiveInt = 128 * MEBIBYTE
     """Largest request body, in bytes; more is answered with 413."""
@@ -39,6 +40,10 @@ class Settings(BaseSettings):
 
     workers: PositiveInt | None = None
     """Threads that infer and edit; by default one for every CPU that the process may use."""
+
+    deadline_seconds: PositiveFloat = 30.0
+    """Longest work on one request, in seconds, not counting its wait for a worker; a mesh that
+    takes more is answered with 422, and with 503 when it was the machine that was busy."""
 
     log_level: Annotated[LogLevel, BeforeValidator(_lower)] = "info"
     """Least severity that is logged."""

@@ -10,6 +10,7 @@ import httpx
 import pytest
 
 from service import __main__, main
+from service.encode.model import SHIPPED
 from service.settings import Settings
 
 
@@ -29,9 +30,9 @@ def test_workers_share_the_cpus(monkeypatch: pytest.MonkeyPatch, serve: Any) -> 
 
     monkeypatch.setattr(main, "cpu_count", lambda: 8)
     monkeypatch.setattr(main, "load_models", load)
-    app = main.create_app(Settings(workers=3, models_dir="/somewhere"))
+    app = main.create_app(Settings(workers=3))
     serve(app).get("/categories")
-    assert [(str(directory), threads) for directory, threads in asked] == [("/somewhere", 2)]
+    assert asked == [(SHIPPED, 2)]
     assert app.state.context.workers.count == 3
     assert main.create_app(Settings(workers=None)).state.context.workers.count == 8
 

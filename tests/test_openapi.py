@@ -24,8 +24,16 @@ def test_the_committed_document_is_the_apps(spec: dict[str, Any]) -> None:
     )
 
 
-def test_the_service_hands_out_the_same(client_of_docs: httpx.Client) -> None:
+def test_the_service_hands_out_the_same_with_the_categories_that_it_has(
+    client_of_docs: httpx.Client,
+) -> None:
+    installed = [entry["name"] for entry in client_of_docs.get("/categories").json()["categories"]]
     answer = client_of_docs.get("/openapi.json").json()
+    for form in ("InferForm", "EditForm"):
+        field = answer["components"]["schemas"][form]["properties"]["category"]
+        assert field["enum"] == ["auto", *installed]
+    for schema in answer["components"]["schemas"].values():
+        schema.get("properties", {}).get("category", {}).pop("enum", None)
     assert answer == yaml.safe_load(COMMITTED.read_text("utf-8"))
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-import service
 from service.settings import Settings
 
 NAMES = [
@@ -15,6 +14,7 @@ NAMES = [
     "MAX_UPLOAD_BYTES",
     "MESH_CACHE_BYTES",
     "WORKERS",
+    "DEADLINE_SECONDS",
     "LOG_LEVEL",
 ]
 
@@ -30,12 +30,14 @@ def test_the_defaults_serve_this_machine_only() -> None:
     assert (settings.host, settings.port) == ("127.0.0.1", 8000)
     assert settings.max_upload_bytes == 134217728
     assert settings.mesh_cache_bytes == 268435456
-    assert settings.models_dir == Path(str(service.__file__)).parent / "models"
+    assert settings.models_dir is None
     assert settings.workers is None
+    assert settings.deadline_seconds == 30
 
 
 def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in zip(NAMES, ["0.0.0.0", "80", "/m", "5", "0", "3", "DEBUG"], strict=True):
+    values = ["0.0.0.0", "80", "/m", "5", "0", "3", "2.5", "DEBUG"]
+    for name, value in zip(NAMES, values, strict=True):
         monkeypatch.setenv(name, value)
     assert Settings() == Settings(
         host="0.0.0.0",
@@ -44,6 +46,7 @@ def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
         max_upload_bytes=5,
         mesh_cache_bytes=0,
         workers=3,
+        deadline_seconds=2.5,
         log_level="debug",
     )
     assert Settings().models_dir == Path("/m")
@@ -51,7 +54,13 @@ def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("PORT", "65536"), ("MAX_UPLOAD_BYTES", "0"), ("WORKERS", "0"), ("LOG_LEVEL", "loud")],
+    [
+        ("PORT", "65536"),
+        ("MAX_UPLOAD_BYTES", "0"),
+        ("WORKERS", "0"),
+        ("DEADLINE_SECONDS", "0"),
+        ("LOG_LEVEL", "loud"),
+    ],
 )
 def test_a_value_that_makes_no_sense_is_refused(
     monkeypatch: pytest.MonkeyPatch, name: str, value: str

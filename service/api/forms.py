@@ -33,8 +33,9 @@ class InferForm(BaseModel):
     mesh: Annotated[
         UploadFile | SkipJsonSchema[None],
         File(
-            description="The mesh file; its format comes from the name's suffix, else from the "
-            "part's content type, else from its first bytes. Either this or `mesh_id`."
+            description="The mesh file, or a zip with one mesh and what belongs to it; its format "
+            "comes from the name's suffix, else from the part's content type, else from its first "
+            "bytes. Either this or `mesh_id`."
         ),
     ] = None
     mesh_id: Annotated[
@@ -102,12 +103,21 @@ class EditForm(InferForm):
     ] = None
     format: Annotated[
         Literal["glb", "gltf", "obj", "ply", "stl", "off"] | SkipJsonSchema[None],
-        Field(description="The answer's format; by default the upload's own."),
+        Field(
+            description="The answer's format; by default the upload's own, a zip for a zip. "
+            "Another holds the bare geometry."
+        ),
     ] = None
+
+    strict: Annotated[
+        bool,
+        Field(description="Refuse an edit that would make a size negative or break a relation of "
+            "the category, with 422, instead of making the nearest one that does not."),
+    ] = False  # fmt: skip
 
     def edit_options(self) -> EditOptions:
         """The options as the pipeline takes them."""
-        return EditOptions(mode=self.mode, keep=self.keep, format=self.format)
+        return EditOptions(self.mode, self.keep, self.format, self.strict)
 
 
 def form_content_type(request: Request) -> None:

@@ -20,6 +20,7 @@ MEDIA_TYPES: dict[str, str] = {
     ".ply": "application/x-ply",
     ".stl": "model/stl",
     ".off": "model/vnd.off",
+    ".zip": "application/zip",
 }
 
 

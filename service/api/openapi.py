@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import deepcopy
 from typing import Any
 
 import yaml
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
+from service.api.context import Context
 from service.api.schemas import ProblemDocument
+from service.mesh.frame import AUTO
 
 DESCRIPTION = """\
 Upload your own mesh; get its named parameters in real units; edit them; get back *the same file*
@@ -18,9 +22,10 @@ with only its vertices moved.
     curl -F mesh=@chair.glb -F 'edits={"seat_width": {"scale": 1.2}}' \\
          http://127.0.0.1:8000/edit -OJ
 
-Formats: `.glb`, `.gltf` (self-contained), `.obj`, `.ply`, `.stl`, `.off`. Every error is an
-`application/problem+json` with a stable `code`, a `detail` and a `suggestion`. Every answer has a
-`Trace-Id`.
+Formats: `.glb`, `.gltf`, `.obj`, `.ply`, `.stl`, `.off`, or a `.zip` with one of them and the files
+that belong to it: a `.gltf` with its `.bin`, an `.obj` with its materials and textures. Every error
+is an `application/problem+json` with a stable `code`, a `detail` and a `suggestion`. Every answer
+has a `Trace-Id`.
 """
 
 TAGS = [
@@ -32,7 +37,25 @@ TAGS = [
 
 
 def document(app: FastAPI) -> dict[str, Any]:
-    """The app's OpenAPI document, made once."""
+    """The app's OpenAPI document; while models are loaded it lists their categories."""
+    spec = _contract(app)
+    context: Context = app.state.context
+    names = context.readiness.names
+    return _with_categories(spec, names) if names else spec
+
+
+def _with_categories(spec: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """The document with the field `category` of each form bound to what is installed."""
+    spec = deepcopy(spec)
+    for schema in spec["components"]["schemas"].values():
+        field = schema.get("properties", {}).get("category", {})
+        if field.get("default") == AUTO:
+            field["enum"] = [AUTO, *names]
+    return spec
+
+
+def _contract(app: FastAPI) -> dict[str, Any]:
+    """The document but for what depends on the installed models, made once."""
     if app.openapi_schema is None:
         spec = get_openapi(
             title=app.title,

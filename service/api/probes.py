@@ -27,7 +27,8 @@ async def livez() -> JSONResponse:
     "/readyz",
     summary="Can it take requests?",
     description="503 until every model is loaded and has answered its golden request: with the "
-    "code `starting`, or `model_fault` when that will not happen by itself.",
+    "code `starting`, or `model_fault` when that will not happen by itself. Models of the "
+    "operator's own that can't be served are listed as `faults`; the others are served.",
     response_class=JSONResponse,
     responses={
         200: {"model": Ready, "description": "It can, with these models."},
@@ -35,12 +36,16 @@ async def livez() -> JSONResponse:
     },
 )
 async def readyz(shared: Shared) -> JSONResponse:
-    models = shared.readiness.loaded()
+    installed = shared.readiness.installed
     names = {
         name: {"name": model.name, "version": model.version, "digest": model.digest}
-        for name, model in models.items()
+        for name, model in installed.models.items()
     }
-    return JSONResponse({"status": "ready", "models": names})
+    faults = [
+        {"code": fault.code, "detail": fault.detail, "suggestion": fault.suggestion}
+        for fault in installed.faults
+    ]
+    return JSONResponse({"status": "ready", "models": names, "faults": faults})
 
 
 @router.get("/", include_in_schema=False)

@@ -16,7 +16,9 @@ from service.errors import (
     InvalidRequest,
     ModelFault,
     NotFound,
+    Overloaded,
     ShapeError,
+    TooComplex,
     TooLarge,
     UnsupportedFormat,
 )
@@ -27,10 +29,15 @@ STATUSES: dict[type[ShapeError], int] = {
     UnsupportedFormat: 415,
     InvalidMesh: 422,
     TooLarge: 413,
+    TooComplex: 422,
     InvalidRequest: 422,
     NotFound: 404,
+    Overloaded: 503,
     ModelFault: 503,
 }
+
+# Seconds after which the same request may well pass.
+RETRY_AFTER = {"starting": "1", "deadline_exceeded": "10"}
 
 # RFC 9110's phrases; older Pythons have others.
 _TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
@@ -48,9 +55,10 @@ _WHAT: dict[int, str] = {
     404: "There is no such category, mesh or path.",
     413: "The upload is over a limit.",
     415: "The format can't be read, or can't be carried through without loss.",
-    422: "The mesh is broken, or an option or edit makes no sense; `code` and `detail` say which.",
+    422: "The mesh is broken or too complex, or an option or edit makes no sense; `code` and "
+    "`detail` say which.",
     500: "The service failed; nothing about the inside is told.",
-    503: "The models are still loading, or one of them can't be trusted.",
+    503: "The models are still loading, one of them can't be trusted, or the service is too busy.",
 }
 
 
@@ -94,7 +102,7 @@ def internal_error(trace_id: str) -> Problem:
 async def _shape_error(request: Request, error: Exception) -> Problem:
     assert isinstance(error, ShapeError)
     status = next(STATUSES[kind] for kind in type(error).__mro__ if kind in STATUSES)
-    headers = {"Retry-After": "1"} if error.code == "starting" else None
+    headers = {"Retry-After": RETRY_AFTER[error.code]} if error.code in RETRY_AFTER else None
     return Problem(
         status, error.code, error.detail, error.suggestion, request.state.trace_id, headers
     )

@@ -8,10 +8,11 @@ from collections.abc import Callable, Mapping
 import anyio
 
 from service.api.workers import Workers
+from service.encode.catalog import Installed
 from service.encode.model import Model
 from service.errors import ModelFault, ShapeError
 
-Load = Callable[[], Mapping[str, Model]]
+Load = Callable[[], Installed]
 
 # Loading takes a second or so; a request that comes meanwhile waits rather than fails.
 PATIENCE_S = 30.0
@@ -20,24 +21,27 @@ logger = logging.getLogger(__name__)
 
 
 class Readiness:
-    """Loads the models once and holds them, or what is wrong with them."""
+    """Loads the models and holds them, or what is wrong with them.
+
+    A request takes the models as they are when it comes and works with those to its end, whatever
+    is reloaded meanwhile.
+    """
 
     def __init__(self, load: Load, workers: Workers) -> None:
+        """`load` finds verified models; it may be called again, but never twice at once."""
         self._load = load
         self._workers = workers
         self._started = False
-        self._models: Mapping[str, Model] | None = None
+        self._installed: Installed | None = None
         self._fault: ShapeError | None = None
         self._done = anyio.Event()
+        self._reloading = anyio.Lock()
 
     async def start(self) -> None:
         """Load every model and put its golden request to it, in a worker thread."""
         self._started = True
         try:
-            self._models = await self._workers.run(self._load_verified)
-            logger.info(
-                "ready: %s", ", ".join(f"{m.name} {m.version}" for m in self._models.values())
-            )
+            self._installed = await self._look()
         except ShapeError as error:
             self._fault = error
             logger.error("not ready: %s", error)
@@ -49,29 +53,57 @@ class Readiness:
         finally:
             self._done.set()
 
-    def _load_verified(self) -> Mapping[str, Model]:
-        models = self._load()
-        if not models:
+    async def reload(self) -> None:
+        """Load the models anew; on any failure those from before are kept."""
+        await self._done.wait()
+        try:
+            self._installed = await self._look()
+            self._fault = None
+        except ShapeError as error:
+            logger.error("not reloaded: %s", error)
+        except Exception:
+            logger.exception("not reloaded")
+
+    async def _look(self) -> Installed:
+        async with self._reloading:
+            installed = await self._workers.run(self._load)
+        for fault in installed.faults:
+            logger.error("not served: %s", fault)
+        if not installed.models:
             raise ModelFault(
                 "model_fault",
                 "No model is installed.",
                 "Point MODELS_DIR at a folder that holds <category>.onnx and <category>.json.",
             )
-        for model in models.values():
-            model.verify()
-        return models
+        models = installed.models.values()
+        logger.info("ready: %s", ", ".join(f"{m.name} {m.version}" for m in models))
+        return installed
 
-    def loaded(self) -> Mapping[str, Model]:
-        """The models by category; ModelFault while they load (`starting`) or when one is bad."""
+    @property
+    def installed(self) -> Installed:
+        """The models and the faults of those that are not served.
+
+        Raises:
+            ModelFault: while they load (`starting`), or when a shipped one is bad.
+        """
         if self._fault is not None:
             raise ModelFault("model_fault", self._fault.detail, self._fault.suggestion)
-        if self._models is None:
+        if self._installed is None:
             raise ModelFault(
                 "starting",
                 "The models are still being loaded and verified.",
                 "Ask again in a second.",
             )
-        return self._models
+        return self._installed
+
+    @property
+    def names(self) -> list[str]:
+        """The categories, sorted; none until they can be served."""
+        return sorted(self._installed.models) if self._installed else []
+
+    def loaded(self) -> Mapping[str, Model]:
+        """The models by category; ModelFault as `installed`."""
+        return self.installed.models
 
     async def models(self) -> Mapping[str, Model]:
         """As `loaded`, but a request that comes during the start waits for it a while.

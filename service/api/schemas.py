@@ -56,9 +56,13 @@ class Frame(Schema):
     up: str
     front: str
     scale: float
-    """Length in the upload's own coordinates of a unit of the normalised frame."""
+    """Length in the normalised frame of a unit of the upload's own coordinates."""
     center: Vector
     """Origin of the normalised frame, in the upload's own coordinates."""
+    rotation: tuple[Vector, Vector, Vector]
+    """Rows: a point's normalised coordinates are ``rotation (own - center) scale``."""
+    lean: float
+    """Degrees by which the upload stands off its axes; 0 for nearly every one."""
 
 
 class Candidate(Schema):
@@ -68,6 +72,9 @@ class Candidate(Schema):
     up: str
     front: str
     distance: float
+    """Of a rough fit, for readings other than the answer; see `fit.distance`."""
+    probability: float
+    """Of this reading among all that were asked for."""
 
 
 class Fit(Schema):
@@ -186,11 +193,21 @@ class Alive(Schema):
     status: Literal["alive"]
 
 
+class Fault(Schema):
+    """A model that can't be served, and why."""
+
+    code: str = Field(examples=["model_digest"])
+    detail: str
+    suggestion: str
+
+
 class Ready(Schema):
     """What `GET /readyz` answers when it is."""
 
     status: Literal["ready"]
     models: dict[str, ModelIdentity]
+    faults: list[Fault]
+    """Models of the operator's own that are not served, or not as they now lie in the folder."""
 
 
 class ProblemDocument(Schema):

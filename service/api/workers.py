@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TypeVar, TypeVarTuple
 
 from anyio import CapacityLimiter, to_thread
+
+from service import deadline
 
 T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
@@ -18,10 +21,17 @@ class Workers:
     pool is.
     """
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, seconds: float = math.inf) -> None:
+        """`seconds` is the deadline of each function, from when a thread takes it up."""
         self.count = count
+        self._seconds = seconds
         self._limiter = CapacityLimiter(count)
 
     async def run(self, function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
         """The function's result, computed in a thread; its error is raised here."""
-        return await to_thread.run_sync(function, *arguments, limiter=self._limiter)
+
+        def work() -> T:
+            with deadline.limit(self._seconds):
+                return function(*arguments)
+
+        return await to_thread.run_sync(work, limiter=self._limiter)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import threading
+import zipfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
@@ -111,6 +112,68 @@ def test_an_empty_edit_gives_the_bytes_back(service_client: httpx.Client, chair_
     assert response.content == chair_glb
 
 
+@pytest.fixture(scope="module")
+def chair_zip(box_chair: trimesh.Trimesh) -> bytes:
+    """The box chair as a glTF, its buffer and a picture, zipped."""
+    files = box_chair.export(file_type="gltf")
+    target = BytesIO()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in {**files, "wood.png": b"\x89PNG"}.items():
+            archive.writestr(f"chair/{name}", content)
+    return target.getvalue()
+
+
+def test_a_zip_comes_back_as_a_zip(service_client: httpx.Client, chair_zip: bytes) -> None:
+    form = {"files": {"mesh": ("chair.zip", chair_zip)}}
+    same = service_client.post("/edit", data={"edits": "{}"}, **form)
+    assert same.content == chair_zip
+    response = service_client.post(
+        "/edit", data={"edits": '{"seat_width": {"scale": 1.25}}'}, **form
+    )
+    assert response.headers["content-type"] == "application/zip"
+    assert 'filename="chair-edited.zip"' in response.headers["content-disposition"]
+    assert response.headers["etag"] != same.headers["etag"]
+    before, after = (zipfile.ZipFile(BytesIO(data)) for data in (chair_zip, response.content))
+    assert after.testzip() is None
+    assert after.namelist() == before.namelist()
+    changed = [name for name in before.namelist() if before.read(name) != after.read(name)]
+    assert "chair/model.gltf" in changed
+    assert all(name.endswith((".gltf", ".bin")) for name in changed)
+    report = service_client.post(
+        "/edit",
+        data={"edits": '{"seat_width": {"scale": 1.25}}'},
+        headers={"accept": "application/json"},
+        **form,
+    ).json()
+    kept = service_client.get(f"/meshes/{report['mesh_id']}")
+    assert kept.content == response.content
+    assert kept.headers["content-type"] == "application/zip"
+
+
+def test_a_zipped_gltf_is_in_metres(
+    service_client: httpx.Client, chair_zip: bytes, chair_glb: bytes
+) -> None:
+    plain, packed = (
+        service_client.post("/infer", files={"mesh": mesh}, data={"units": "cm"}).json()
+        for mesh in (("chair.glb", chair_glb), ("chair.zip", chair_zip))
+    )
+    assert packed["parameters"] == plain["parameters"]
+    assert packed["parameters"]["seat_width"]["value"] == pytest.approx(48, abs=3)
+
+
+def test_a_zip_in_another_format_is_a_plain_file(
+    service_client: httpx.Client, chair_zip: bytes
+) -> None:
+    response = service_client.post(
+        "/edit",
+        files={"mesh": ("chair.zip", chair_zip)},
+        data={"edits": "{}", "format": "glb"},
+    )
+    assert response.headers["content-type"] == "model/gltf-binary"
+    assert 'filename="chair-edited.glb"' in response.headers["content-disposition"]
+    assert load(response.content).extents[1] == pytest.approx(0.88, abs=1e-5)
+
+
 def test_an_edit_by_id_with_a_report(service_client: httpx.Client, chair_glb: bytes) -> None:
     files = {"mesh": ("chair.glb", chair_glb)}
     inferred = service_client.post("/infer", files=files).json()
@@ -212,3 +275,20 @@ def test_real_edits_in_parallel_agree(service_client: httpx.Client, chair_glb: b
     with ThreadPoolExecutor(2) as pool:
         answers = set(pool.map(edit, range(4)))
     assert len(answers) == 1
+
+
+def test_an_edit_too_far_is_the_nearest_or_when_strict_refused(
+    service_client: httpx.Client, problem: Any, chair_glb: bytes
+) -> None:
+    def send(**fields: str) -> httpx.Response:
+        return service_client.post(
+            "/edit",
+            files={"mesh": ("chair.glb", chair_glb)},
+            data={"edits": '{"leg_width": 0.4}', **fields},
+        )
+
+    near = json.loads(send().headers["shape-parameters"])
+    assert near["leg_width"] == pytest.approx(0.4 * near["seat_width"], rel=1e-5)
+    document = problem(send(strict="true"), 422, "edit_out_of_bounds")
+    assert "2 * leg_width >= 0" in document.detail
+    assert f"{near['leg_width']:.4g}" in document.suggestion

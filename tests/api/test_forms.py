@@ -22,14 +22,14 @@ def test_the_upload_reaches_the_pipeline_as_it_is(client: httpx.Client, pretend:
 def test_the_options_reach_the_pipeline(client: httpx.Client, pretend: Any) -> None:
     data = {
         "category": "stool", "up": "+z", "front": "-y", "units": "mm", "refine": "false",
-        "edits": "{}", "mode": "paper", "keep": "seat", "format": "stl",
+        "edits": "{}", "mode": "paper", "keep": "seat", "format": "stl", "strict": "true",
     }  # fmt: skip
     assert client.post("/edit", files={"mesh": MESH}, data=data).status_code == 200
     call = pretend.calls[0]
     assert call["options"] == InferOptions(
         category="stool", up="+z", front="-y", units="mm", refine=False
     )
-    assert call["edit_options"] == EditOptions(mode="paper", keep="seat", format="stl")
+    assert call["edit_options"] == EditOptions(mode="paper", keep="seat", format="stl", strict=True)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from starlette.responses import Response
 
 from service.api.mesh_response import MEDIA_TYPES, mesh_response
 from service.mesh.formats import READERS
+from service.mesh.zipped import ZippedFile
 from service.requests import Upload
 
 
@@ -47,7 +48,8 @@ def test_another_tag_gets_the_content(tags: str) -> None:
 
 
 def test_every_format_has_the_media_type_of_its_reader() -> None:
-    assert {name: MEDIA_TYPES[f".{name}"] for name in READERS} == {
-        name: reader.media_type for name, reader in READERS.items()
+    readers = {**READERS, "zip": ZippedFile}
+    assert {name: MEDIA_TYPES[f".{name}"] for name in readers} == {
+        name: reader.media_type for name, reader in readers.items()
     }
-    assert len(MEDIA_TYPES) == len(READERS)
+    assert len(MEDIA_TYPES) == len(readers)

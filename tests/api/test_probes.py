@@ -18,6 +18,7 @@ def test_alive_and_ready(client: httpx.Client) -> None:
     Alive.model_validate_json(client.get("/livez").content, extra="forbid")
     ready = Ready.model_validate_json(client.get("/readyz").content, extra="forbid")
     assert ready.models["stool"].digest == "sha256-00"
+    assert ready.faults == []
 
 
 def test_while_models_load_it_is_alive_but_not_ready(

@@ -11,8 +11,10 @@ CASES = [
     (errors.UnsupportedFormat, 415, "Unsupported Media Type"),
     (errors.InvalidMesh, 422, "Unprocessable Content"),
     (errors.TooLarge, 413, "Content Too Large"),
+    (errors.TooComplex, 422, "Unprocessable Content"),
     (errors.InvalidRequest, 422, "Unprocessable Content"),
     (errors.NotFound, 404, "Not Found"),
+    (errors.Overloaded, 503, "Service Unavailable"),
     (errors.ModelFault, 503, "Service Unavailable"),
 ]
 

@@ -9,11 +9,12 @@ import pytest
 
 from service.api.readiness import Readiness
 from service.api.workers import Workers
+from service.encode.catalog import Installed
 from service.errors import ModelFault
 
 
-def model(verify: Any = lambda: None) -> Any:
-    return SimpleNamespace(name="stool", version="1", verify=verify)
+def model() -> Any:
+    return SimpleNamespace(name="stool", version="1")
 
 
 def fault_of(readiness: Readiness) -> ModelFault:
@@ -23,14 +24,14 @@ def fault_of(readiness: Readiness) -> ModelFault:
 
 
 def test_before_the_start_it_is_starting() -> None:
-    assert fault_of(Readiness(lambda: {"stool": model()}, Workers(1))).code == "starting"
+    assert fault_of(Readiness(lambda: Installed({"stool": model()}), Workers(1))).code == "starting"
 
 
 def test_models_that_verify_are_handed_out() -> None:
     stool = model()
 
     async def start_and_ask() -> Any:
-        readiness = Readiness(lambda: {"stool": stool}, Workers(1))
+        readiness = Readiness(lambda: Installed({"stool": stool}), Workers(1))
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(readiness.start)
             return await readiness.models()
@@ -38,7 +39,7 @@ def test_models_that_verify_are_handed_out() -> None:
     assert anyio.run(start_and_ask) == {"stool": stool}
 
 
-def raise_golden() -> None:
+def raise_golden() -> Any:
     raise ModelFault("model_golden", "stool answers off by 0.2", "Export it again.")
 
 
@@ -49,8 +50,8 @@ def raise_unforeseen() -> Any:
 @pytest.mark.parametrize(
     ("load", "detail"),
     [
-        (lambda: {"stool": model(), "bench": model(raise_golden)}, "stool answers off by 0.2"),
-        (lambda: {}, "No model is installed."),
+        (raise_golden, "stool answers off by 0.2"),
+        (lambda: Installed({}), "No model is installed."),
         (raise_unforeseen, "The models could not be loaded."),
     ],
 )
@@ -68,7 +69,7 @@ def test_a_request_waits_for_the_start_only_so_long(monkeypatch: pytest.MonkeyPa
 
     def load() -> Any:
         release.wait(20)
-        return {"stool": model()}
+        return Installed({"stool": model()})
 
     async def ask_twice() -> Any:
         readiness = Readiness(load, Workers(1))
@@ -91,7 +92,7 @@ def test_without_a_lifespan_the_first_request_is_the_start() -> None:
 
     def load() -> Any:
         loads.append(1)
-        return {"stool": model()}
+        return Installed({"stool": model()})
 
     async def ask_twice() -> Any:
         readiness = Readiness(load, Workers(1))
@@ -99,3 +100,53 @@ def test_without_a_lifespan_the_first_request_is_the_start() -> None:
 
     assert anyio.run(ask_twice) == [["stool"], ["stool"]]
     assert loads == [1]
+
+
+def reloaded(*looks: Any) -> Readiness:
+    """Started at the first look, then reloaded for each further one."""
+    finds = iter(looks)
+    readiness = Readiness(lambda: next(finds)(), Workers(1))
+
+    async def start_and_reload() -> None:
+        await readiness.start()
+        for _ in looks[1:]:
+            await readiness.reload()
+
+    anyio.run(start_and_reload)
+    return readiness
+
+
+def test_a_reload_hands_out_what_is_there_now() -> None:
+    old, new = model(), model()
+    bad = ModelFault("model_digest", "bench.onnx is altered", "Export it again.")
+    readiness = reloaded(
+        lambda: Installed({"stool": old}), lambda: Installed({"stool": new, "bench": old}, (bad,))
+    )
+    assert readiness.loaded() == {"stool": new, "bench": old}
+    assert readiness.names == ["bench", "stool"]
+    assert readiness.installed.faults == (bad,)
+
+
+@pytest.mark.parametrize("look", [raise_golden, raise_unforeseen, lambda: Installed({})])
+def test_a_reload_that_fails_keeps_what_was_there(look: Any) -> None:
+    stool = model()
+    assert reloaded(lambda: Installed({"stool": stool}), look).loaded() == {"stool": stool}
+
+
+def test_a_reload_can_make_good_a_failed_start() -> None:
+    assert reloaded(raise_golden, lambda: Installed({"stool": model()})).names == ["stool"]
+    assert Readiness(lambda: Installed({}), Workers(1)).names == []
+
+
+def test_requests_keep_the_models_that_they_began_with() -> None:
+    old, new = model(), model()
+    finds = iter([Installed({"stool": old}), Installed({"stool": new})])
+    readiness = Readiness(lambda: next(finds), Workers(1))
+
+    async def reload_within_a_request() -> Any:
+        await readiness.start()
+        models = await readiness.models()
+        await readiness.reload()
+        return models, await readiness.models()
+
+    assert anyio.run(reload_within_a_request) == ({"stool": old}, {"stool": new})

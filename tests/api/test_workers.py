@@ -1,12 +1,15 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import anyio
 import anyio.to_thread
 import pytest
 
+from service import deadline
 from service.api.workers import Workers
+from service.errors import Overloaded
 
 
 def test_no_more_than_count_run_at_once() -> None:
@@ -42,3 +45,20 @@ def test_results_and_errors_come_back() -> None:
     assert anyio.run(divide, 6, 3) == 2.0
     with pytest.raises(ZeroDivisionError):
         anyio.run(divide, 1, 0)
+
+
+def test_each_function_has_its_own_deadline() -> None:
+    def work(seconds: float) -> str:
+        time.sleep(seconds)
+        deadline.check()
+        return "done"
+
+    async def two() -> str:
+        workers = Workers(1, 0.05)
+        with pytest.raises(Overloaded):
+            await workers.run(work, 0.1)
+        # Not even one that waited for its thread all that time has less.
+        return await workers.run(work, 0.0)
+
+    assert anyio.run(two) == "done"
+    deadline.check()
