@@ -11,9 +11,8 @@ import yaml
 
 from model_export.losses import Weights
 from model_export.synthetic import Augmentation
-
-SHIPPED = Path(str(resources.files("service"))) / "models"
-"""The folder of the models that come with the service."""
+from service.encode.model import SHIPPED as SHIPPED
+from service.template.loader import load_template
 
 
 @dataclass(frozen=True)
@@ -57,6 +56,40 @@ class Config:
     augmentation: Augmentation = field(default_factory=Augmentation)
     log_share: float = 0.0
     seed: int = 0
+
+
+FULL, QUICK = "chair", "quick"
+"""Settings for a category of one's own: those of the shipped chair, or minutes instead of hours."""
+
+
+def config_of(source: str, quick: bool = False, **overrides: Any) -> Config:
+    """What to train: a configuration (see `load_config`), or a template file with shipped settings.
+
+    Args:
+        source: a built-in configuration's name, or the path of a configuration or a template.
+        quick: minutes on a CPU instead of hours; for template files.
+        overrides: settings that win where they are not None.
+
+    Raises:
+        ValueError: as `load_config`; TemplateError for a template that can't be compiled.
+    """
+    if is_template(source):
+        served = load_template(source).points
+        settings = QUICK if quick else FULL
+        return load_config(settings, template=source, final_points=served, **overrides)
+    if quick:
+        raise ValueError(f"{source} is a configuration with its own settings; --quick is for "
+            "template files")  # fmt: skip
+    return load_config(source, **overrides)
+
+
+def is_template(source: str) -> bool:
+    """Whether a path is that of a template file: one that lists parts."""
+    path = Path(source)
+    if path.suffix not in (".yaml", ".yml") or not path.is_file():
+        return False
+    entries = yaml.safe_load(path.read_text("utf-8"))
+    return isinstance(entries, dict) and "parts" in entries
 
 
 def load_config(source: str, **overrides: Any) -> Config:

@@ -46,13 +46,18 @@ def edit_panels(model: Model, shape: RealisticShape, factors: Sequence[float]) -
     panels: list[Panel] = []
     for factor in factors:
         panels.append(Panel(shape.name[:30], [(mesh.vertices, mesh.faces, YELLOW, 1.0)]))
-        for name in model.template.names:
+        for name in public_names(model):
             change = {name: Change("scale", factor)}
             edited = edit(found.upload, {model.name: model}, UPRIGHT, change, EditOptions())
             moved = read_mesh(edited.data, found.upload.name)
             title = f"{name} x {factor:g}"
             panels.append(Panel(title, [(moved.vertices, moved.faces, GREY, 1.0)]))
     return panels
+
+
+def public_names(model: Model) -> list[str]:
+    """The parameters that an edit may name."""
+    return [parameter.name for parameter in model.template.parameters if not parameter.nuisance]
 
 
 def _infer(model: Model, shape: RealisticShape) -> Inference:
@@ -76,7 +81,7 @@ def main() -> None:
     if arguments.shape:
         chosen = next(shape for shape in shapes if shape.name == arguments.shape)
         panels = edit_panels(model, chosen, (0.7, 1.4))
-        save_sheet(panels, arguments.out, columns=1 + len(model.template.names))
+        save_sheet(panels, arguments.out, columns=1 + len(public_names(model)))
         return
     held_out = [shape for shape in shapes if shape.held_out and shape.info.get("core", True)]
     order = np.random.default_rng(0).permutation(len(held_out))[: arguments.count]

@@ -14,18 +14,24 @@ from typing import Any
 import numpy as np
 import torch
 
-from model_export.calibrate import calibrate
 from model_export.config import SHIPPED, from_plain
-from model_export.evaluate import clouds_of, real_fits, synthetic_samples, synthetic_table
+from model_export.discriminate import Data, assess, build
+from model_export.evaluate import clouds_of, real_fits, synthetic_table
 from model_export.networks import PointEncoder, fold_batch_norm
 from model_export.realistic import RealisticShape, find_shapes
 from model_export.refit import refit
+from model_export.report import write_report
+from model_export.train import template_copy
+from service.encode.discriminator import DISCRIMINATOR_SUFFIX
 from service.encode.model import Model, file_digest, golden_cloud
 from service.encode.session import EncoderSession
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
 
 TOLERANCE = 1e-4
+FULL = {"refit": 4000, "count": 1000, "steps": 1500}
+QUICK = {"refit": 2000, "count": 200, "steps": 120}
+"""How many synthetic shapes to refit to and to measure on, and steps of the discriminator."""
 PAPER = "Wei et al., Learning to Infer Semantic Parameters for 3D Shape Editing, 3DV 2020"
 
 
@@ -97,6 +103,7 @@ def build_card(
             {
                 "name": p.name, "label": p.label, "paper_name": p.paper, "unit": "m",
                 "range": [p.low, p.high], "typical": list(p.typical),
+                "nuisance": p.nuisance,
             }
             for p in template.parameters
         ],
@@ -107,7 +114,7 @@ def build_card(
                     "steps": run["step"],
                     "hours": round(run["seconds"] / 3600, 2),
                     "place": run["place"],
-                    "config": run["config"],
+                    "config": run["config"] | {"template": Path(run["config"]["template"]).name},
                 }
                 for run in [*state["earlier"], state]
             ],
@@ -131,6 +138,14 @@ def describe_data(shapes: list[RealisticShape]) -> dict[str, Any]:
     }
 
 
+def template_source(folder: Path, template: str) -> str | Path:
+    """What a run trained: its own copy of a template file, or the name of a built-in category."""
+    if not template.endswith((".yaml", ".yml")):
+        return template
+    copy = template_copy(folder, template)
+    return copy if copy.is_file() else Path(template)
+
+
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m model_export.export", description=__doc__)
@@ -141,20 +156,28 @@ def main() -> None:
     parser.add_argument("--cache", type=Path, default=Path("cache"), help="for sampled clouds")
     parser.add_argument("--out", type=Path, default=SHIPPED, help="models folder")
     parser.add_argument("--version", default="1.0.0", help="of the model")
+    parser.add_argument("--quick", action="store_true", help="minutes on a CPU, as for training")
+    parser.add_argument("--refit", type=int, help="synthetic shapes to refit the last layer to")
+    parser.add_argument("--count", type=int, help="synthetic shapes to measure on")
+    parser.add_argument("--steps", type=int, help="of training the discriminator")
     parser.add_argument(
-        "--refit", type=int, default=4000, help="synthetic shapes to refit the last layer to"
-    )
-    parser.add_argument("--count", type=int, default=1000, help="synthetic shapes to measure on")
+        "--others", type=Path, nargs="*", default=[],
+        help="folders of meshes of other kinds, for the discriminator",
+    )  # fmt: skip
+    parser.add_argument("--but", help="regular expression: files there that are of the category")
     arguments = parser.parse_args()
+    for name, size in (QUICK if arguments.quick else FULL).items():
+        if getattr(arguments, name) is None:
+            setattr(arguments, name, size)
     folder = arguments.run or Path("runs") / arguments.name
     state = torch.load(folder / "checkpoint.pt", map_location="cpu")
-    template = load_template(state["config"]["template"])
+    source = template_source(folder, state["config"]["template"])
+    template = load_template(source)
     encoder = load_encoder(state)
     if arguments.refit:
         refit(encoder, template, from_plain(state["config"]), arguments.refit)
     arguments.out.mkdir(parents=True, exist_ok=True)
-    source = Path(state["config"]["template"])
-    if source.suffix in (".yaml", ".yml"):
+    if isinstance(source, Path):
         shutil.copyfile(source, arguments.out / f"{template.name}.yaml")
     path = arguments.out / f"{template.name}.onnx"
     write_onnx(encoder, template.points, path)
@@ -163,11 +186,15 @@ def main() -> None:
     gap = check_onnx(encoder, path, random_clouds(template.points, 20) + clouds)
     print(f"onnxruntime and torch differ by {gap:.1e} over {20 + len(clouds)} clouds")
     card = build_card(template, state, path, arguments.version)
+    if isinstance(source, Path):
+        card["template_digest"] = file_digest(source)
     card["training"]["refit_shapes"] = arguments.refit
     card["data"] = describe_data(shapes)
+    data = Data(shapes, arguments.others, arguments.but)
+    second = path.with_suffix(DISCRIMINATOR_SUFFIX)
+    card["discriminator"] = build(template, data, arguments.steps, second, arguments.cache)
     model = Model(card, template, path, threads=1)
-    ordinary = [s for s in shapes if not s.held_out and s.info.get("core", True)]
-    card["calibration"] = calibrate(model, ordinary, synthetic_samples(model, 100)[0])
+    assess(model, data, arguments.cache)
     card["metrics"] = {"synthetic": synthetic_table(model, arguments.count)}
     if shapes:
         held_out = [shape for shape in shapes if shape.held_out]
@@ -178,6 +205,7 @@ def main() -> None:
     card_path.write_text(json.dumps(card, indent=2) + "\n", "utf-8")
     model.verify()
     print(f"wrote {path} and {card_path}")
+    print(f"wrote {write_report(folder, model, shapes)}")
 
 
 if __name__ == "__main__":

@@ -19,6 +19,8 @@ from service.mesh.surface import RADIUS, sample_surface
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 CLOUD_SIZE = 8192
+GROUPS = ("near_dup_group", "family", "group")
+"""Entries of a manifest that shapes too much alike to be on both sides of the split share."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,8 @@ class RealisticShape:
 def find_shapes(folder: Path) -> list[RealisticShape]:
     """The meshes of a folder, canonically oriented (+Y up, +Z front).
 
-    With a ``manifest.jsonl`` (one object a line; ``file`` is required, ``id`` and
-    ``near_dup_group`` are used) these files; without one every mesh file below the folder.
+    With a ``manifest.jsonl`` (one object a line; ``file`` is required, `GROUPS` and ``id`` are
+    used) these files; without one every mesh file below the folder.
     A fifth is held out, chosen by a hash of the group: near duplicates fall on the same side.
     """
     manifest = folder / "manifest.jsonl"
@@ -45,7 +47,7 @@ def find_shapes(folder: Path) -> list[RealisticShape]:
     else:
         paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
         rows = [{"id": path.stem, "file": str(path.relative_to(folder))} for path in paths]
-    groups = [str(row.get("near_dup_group") or row.get("id", row["file"])) for row in rows]
+    groups = [_group(row) for row in rows]
     test = _held_out(groups)
     return [
         RealisticShape(
@@ -56,6 +58,12 @@ def find_shapes(folder: Path) -> list[RealisticShape]:
         )
         for row, group in zip(rows, groups, strict=True)
     ]
+
+
+def _group(row: dict[str, object]) -> str:
+    """What tells near duplicates of a shape."""
+    entries = (row.get(name) for name in (*GROUPS, "id", "file"))
+    return str(next(entry for entry in entries if entry))
 
 
 def _held_out(groups: list[str]) -> set[str]:

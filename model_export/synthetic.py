@@ -84,13 +84,15 @@ class SyntheticShapes:
 
     def draw_parameters(self, count: int) -> np.ndarray:
         """``[count, d]`` parameters in metres that keep the template's relations."""
-        low, high = self.template.low, self.template.high
+        low, high, signed = self.template.low, self.template.high, self.template.signed
+        floor = np.where(signed, high, low)
         kept: list[np.ndarray] = []
         missing = count
         while missing > 0:
             uniform = self.rng.random((2 * missing, len(low)))
             linear = low + uniform * (high - low)
-            logarithmic = low * (high / low) ** uniform
+            # Signed offsets have no logarithm and stay even.
+            logarithmic = np.where(signed, linear, floor * (high / floor) ** uniform)
             use_log = self.rng.random((2 * missing, 1)) < self.log_share
             f = np.where(use_log, logarithmic, linear)
             relations = self.template.relations

@@ -1,4 +1,6 @@
-"""Train a category's encoder: ``python -m model_export.train chair --realistic DIR``."""
+"""Train a category's encoder: ``python -m model_export.train chair --realistic DIR``, or
+``python -m model_export.train table.yaml --quick`` for a category of one's own.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,7 @@ import argparse
 import dataclasses
 import json
 import math
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -14,7 +17,7 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from model_export.config import Config, load_config
+from model_export.config import Config, config_of
 from model_export.losses import Losses, draw_edit, total
 from model_export.metrics import Recovery, recovery
 from model_export.networks import PointEncoder
@@ -207,18 +210,19 @@ def validate(encoder: PointEncoder, template: AffineTemplate, batch: Batch) -> R
 
 def run(trainer: Trainer, folder: Path, every: int = 1000, until: int | None = None) -> Recovery:
     """Train to the end, with a checkpoint, a log line and validation figures every so often."""
-    folder.mkdir(parents=True, exist_ok=True)
+    _prepare(trainer, folder)
     batch = validation_set(trainer.template, 200)
     last = min(until or trainer.config.steps, trainer.config.steps)
     bar = tqdm(total=trainer.config.steps, initial=trainer.step, unit="step", mininterval=2.0)
     began, result = time.monotonic() - trainer.seconds, None
     means: dict[str, float] = {}
+    shown = "not measured yet"
     while trainer.step < last:
         for name, value in trainer.train_step().items():
             means[name] = 0.98 * means.get(name, value) + 0.02 * value
         bar.update()
         if trainer.step % 20 == 0:
-            bar.set_postfix_str(" ".join(f"{n} {v:.2e}" for n, v in means.items()), refresh=False)
+            bar.set_postfix_str(f"loss {means['loss']:.3g}, within {shown}", refresh=False)
         if trainer.step % every == 0 or trainer.step == last:
             trainer.seconds = time.monotonic() - began
             result = validate(trainer.encoder, trainer.template, batch)
@@ -228,15 +232,49 @@ def run(trainer: Trainer, folder: Path, every: int = 1000, until: int | None = N
                     "within": result.within, "edited": result.edited}  # fmt: skip
             with (folder / "log.jsonl").open("a") as log:
                 log.write(json.dumps(line) + "\n")
-            bar.write(f"step {trainer.step}: vertices within .01/.02/.03: {result.row()} %")
+            shown = f"{result.row()} %"
+            bar.write(f"step {trainer.step}: vertices within .01/.02/.03: {shown}")
     bar.close()
     return result or validate(trainer.encoder, trainer.template, batch)
+
+
+def template_copy(folder: Path, template: str) -> Path:
+    """Where a run keeps the template file that it trains."""
+    return folder / Path(template).name
+
+
+def require_same_template(folder: Path, template: str) -> None:
+    """Refuse to go on with a run in ``folder`` whose template file has changed since it began.
+
+    Raises:
+        ValueError: when it has.
+    """
+    source, copy = Path(template), template_copy(folder, template)
+    if copy.is_file() and source.is_file() and copy.read_bytes() != source.read_bytes():
+        raise ValueError(
+            f"{source} has changed since the run in {folder} began: start anew, without --resume"
+        )
+
+
+def _prepare(trainer: Trainer, folder: Path) -> None:
+    """Make a run's folder, with its template file in it and without a former run's log."""
+    folder.mkdir(parents=True, exist_ok=True)
+    source = Path(trainer.config.template)
+    copy = template_copy(folder, trainer.config.template)
+    if source.is_file() and copy.resolve() != source.resolve():
+        shutil.copyfile(source, copy)
+    if trainer.step == 0:
+        (folder / "log.jsonl").unlink(missing_ok=True)
 
 
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m model_export.train", description=__doc__)
-    parser.add_argument("config", help="a configuration: built-in name (chair) or YAML file")
+    parser.add_argument(
+        "config",
+        help="a template file (table.yaml), or a configuration: built-in name or YAML file",
+    )
+    parser.add_argument("--quick", action="store_true", help="a template file in minutes, on a CPU")
     parser.add_argument("--realistic", type=Path, help="folder of unlabelled real meshes")
     parser.add_argument("--out", type=Path, help="folder of the run (default runs/<config>)")
     parser.add_argument("--cache", type=Path, default=Path("cache"), help="for sampled clouds")
@@ -247,11 +285,18 @@ def main() -> None:
     parser.add_argument("--compile", action="store_true", help="faster; needs a C++ compiler")
     parser.add_argument("--steps", type=int, help="instead of the configuration's")
     parser.add_argument("--seed", type=int, help="instead of the configuration's")
-    parser.add_argument("--every", type=int, default=1000, help="steps between checkpoints")
+    parser.add_argument(
+        "--every", type=int, help="steps between checkpoints (default: at most 1000)"
+    )
     arguments = parser.parse_args()
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
-    config = load_config(arguments.config, steps=arguments.steps, seed=arguments.seed)
+    try:
+        config = config_of(
+            arguments.config, arguments.quick, steps=arguments.steps, seed=arguments.seed
+        )
+    except (OSError, ValueError) as error:
+        parser.exit(1, f"{error}\n")
     realistic = None
     if arguments.realistic:
         realistic = RealisticShapes(
@@ -263,9 +308,10 @@ def main() -> None:
     if arguments.start_from:
         trainer.start_from(torch.load(arguments.start_from, map_location=arguments.device))
     if arguments.resume:
+        require_same_template(folder, config.template)
         state = torch.load(folder / "checkpoint.pt", map_location=arguments.device)
         trainer.restore(state)
-    run(trainer, folder, arguments.every)
+    run(trainer, folder, arguments.every or min(1000, max(1, config.steps // 12)))
 
 
 if __name__ == "__main__":

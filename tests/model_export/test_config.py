@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from model_export.config import Config, load_config
+from model_export.config import Config, config_of, load_config
 from model_export.losses import Weights
 from model_export.synthetic import Augmentation
+from service.template.loader import load_template
 
 
 def test_the_defaults_are_the_papers() -> None:
@@ -27,6 +28,16 @@ def test_the_shipped_chair_has_a_configuration() -> None:
     assert config.weights == Weights()
     low, high = config.points
     assert 0 < low <= high
+
+
+def test_airplanes_are_trained_with_the_papers_weights_for_them() -> None:
+    first, second = load_config("airplane"), load_config("airplane-served-size")
+    served = load_template("airplane").points
+    assert first.template == second.template == "airplane"
+    assert first.weights == second.weights == Weights(alpha=0.3, beta=200, gamma=10)
+    assert first.final_points == served
+    assert second.points == (served, served)
+    assert (first.shared, first.head) == (second.shared, second.head)
 
 
 def test_a_file_overrides_the_defaults_and_the_caller_overrides_the_file(tmp_path: Path) -> None:
@@ -61,3 +72,21 @@ def test_a_setting_that_does_not_exist_is_refused(tmp_path: Path) -> None:
 def test_a_configuration_that_does_not_exist_is_refused() -> None:
     with pytest.raises(ValueError, match="no configuration named 'sofa'"):
         load_config("sofa")
+
+
+def test_a_template_file_is_trained_with_shipped_settings(stand_file: Path) -> None:
+    full, quick = config_of(str(stand_file)), config_of(str(stand_file), quick=True, steps=5)
+    assert full.template == quick.template == str(stand_file)
+    assert full.final_points == quick.final_points == 64
+    assert full.batch == load_config("chair").batch
+    assert (quick.batch, quick.steps) == (load_config("quick").batch, 5)
+    assert load_config("quick").steps * load_config("quick").batch < full.steps * full.batch / 10
+
+
+def test_a_configuration_has_its_own_settings(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("steps: 7\n", "utf-8")
+    assert config_of(str(path)) == Config(steps=7)
+    assert config_of("chair") == load_config("chair")
+    with pytest.raises(ValueError, match="--quick is for template files"):
+        config_of("chair", quick=True)

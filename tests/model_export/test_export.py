@@ -10,7 +10,7 @@ import onnx
 import pytest
 import torch
 
-from model_export import export
+from model_export import discriminate, export
 from model_export.config import Config
 from model_export.realistic import find_shapes
 from model_export.train import Trainer
@@ -126,10 +126,8 @@ def test_the_card_says_what_the_data_was(meshes: Path, tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def exported(
-    state: dict[str, Any], meshes: Path, stand_file: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
-    """A models folder that the command line wrote, with the template beside."""
+def exported(state: dict[str, Any], meshes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A models folder that the command line wrote."""
     folder = tmp_path_factory.mktemp("export")
     run, out = folder / "run", folder / "models"
     run.mkdir()
@@ -137,11 +135,13 @@ def exported(
     (folder / "ablation.json").write_text('{"no editing": 1}', "utf-8")
     arguments = ["export", "stand", "--run", run, "--realistic", meshes, "--out", out,
                  "--cache", folder / "cache", "--version", "3.1.0", "--count", "3",
+                 "--refit", "200", "--steps", "2",
                  "--ablation", folder / "ablation.json"]  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
+        heaps = discriminate.heaps
+        patch.setattr(discriminate, "heaps", lambda count, *rest: heaps(10, *rest))
         patch.setattr("sys.argv", list(map(str, arguments)))
         export.main()
-    shutil.copy(stand_file, out / "stand.yaml")
     return out
 
 
@@ -154,6 +154,8 @@ def test_the_command_line_writes_a_model_that_the_service_loads(exported: Path) 
     assert card["metrics"]["realistic"]["all"]["shapes"] == 2
     assert card["metrics"]["ablation"] == {"no editing": 1}
     assert card["data"]["realistic"]["train"] == 8
+    assert card["template_digest"] == file_digest(exported / "stand.yaml")
+    assert card["discriminator"]["data"] == {"realistic": 8, "others": 10}
 
 
 @pytest.mark.parametrize(

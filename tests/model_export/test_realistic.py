@@ -71,6 +71,30 @@ def test_a_fifth_is_held_out_and_near_duplicates_stay_together(listed: Path) -> 
     assert find_shapes(listed) == found
 
 
+@pytest.mark.parametrize(
+    ("entries", "kept"),
+    [
+        (("near_dup_group", "family", "group"), "near_dup_group"),
+        (("family", "group"), "family"),
+        (("group",), "group"),
+    ],
+)
+def test_the_closest_kinship_that_a_manifest_names_stays_together(
+    tmp_path: Path, entries: tuple[str, ...], kept: str
+) -> None:
+    sizes = {"near_dup_group": 2, "family": 4, "group": 5}
+    rows = [
+        {"file": f"m{index}.obj", **{entry: f"{entry}{index // sizes[entry]}" for entry in entries}}
+        for index in range(80)
+    ]
+    (tmp_path / "manifest.jsonl").write_text("\n".join(map(json.dumps, rows)), "utf-8")
+    found = find_shapes(tmp_path)
+    assert sum(shape.held_out for shape in found) == 80 // 5 // sizes[kept] * sizes[kept]
+    for group in {shape.info[kept] for shape in found}:
+        sides = {shape.held_out for shape in found if shape.info[kept] == group}
+        assert len(sides) == 1
+
+
 def test_the_two_sides_have_no_shape_in_common(listed: Path, tmp_path: Path) -> None:
     train = RealisticShapes(listed, tmp_path / "cache", seed=0)
     test = RealisticShapes(listed, tmp_path / "cache", seed=0, held_out=True)

@@ -8,6 +8,7 @@ import torch
 
 from model_export.synthetic import Augmentation, Batch, SyntheticShapes
 from service.template.affine import AffineTemplate
+from service.template.loader import load_template
 
 CLEAN = Augmentation.none()
 PLAIN = {
@@ -70,6 +71,27 @@ def test_draws_fill_the_ranges_evenly_or_evenly_in_the_logarithm(stand: AffineTe
     below = (half < geometric).mean(axis=0)
     expected = 0.5 * (0.5 + (geometric - free.low) / (free.high - free.low))
     np.testing.assert_allclose(below, expected, atol=0.03)
+
+
+def test_signed_offsets_are_drawn_evenly_always(stand: AffineTemplate) -> None:
+    slab, *others = stand.parameters
+    signed = replace(slab, low=-0.5, nuisance=True)
+    free = replace(stand, relations=np.zeros((0, 4)), parameters=(signed, *others))
+    logs = SyntheticShapes(free, CLEAN, seed=2, log_share=1.0).draw_parameters(4000)
+    quarters = np.quantile(logs[:, 0], [0.25, 0.5, 0.75])
+    np.testing.assert_allclose(quarters, [0.0, 0.5, 1.0], atol=0.05)
+    np.testing.assert_allclose(np.median(logs[:, 1]), 0.1, rtol=0.04)
+
+
+def test_airplanes_are_drawn_in_range_and_whole() -> None:
+    airplane = load_template("airplane")
+    shapes = SyntheticShapes(airplane, CLEAN, seed=1, log_share=0.25)
+    f = shapes.draw_parameters(500)
+    assert ((f >= airplane.low) & (f <= airplane.high)).all()
+    assert (f @ airplane.relations[:, 1:].T >= 0).all()
+    assert (f[:, airplane.signed].min(axis=0) < 0).all()
+    batch = shapes.batch(4, 200)
+    assert torch.isfinite(batch.points).all()
 
 
 def test_the_seed_decides_everything(chair: AffineTemplate) -> None:

@@ -198,7 +198,8 @@ def test_a_run_logs_validates_and_leaves_a_checkpoint(small_config: Config, tmp_
     assert lines[1]["within"] == list(stopped.within)
     assert lines[3]["within"] == list(result.within)
     assert {"loss", "sem", "rec", "seconds", "edited"} <= set(lines[0])
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["checkpoint.pt", "log.jsonl"]
+    kept = {"checkpoint.pt", "log.jsonl", "stand.yaml"}
+    assert {path.name for path in tmp_path.iterdir()} == kept
     assert torch.load(tmp_path / "checkpoint.pt", weights_only=True)["step"] == 8
 
 
@@ -238,3 +239,48 @@ def test_a_template_with_a_fixed_length_is_refused(stand: AffineTemplate) -> Non
     fixed = replace(stand, base=stand.base + np.eye(1, 3) * 0.05)
     with pytest.raises(ValueError, match="'stand' has a constant length"):
         require_scale_free(fixed)
+
+
+def test_a_new_run_forgets_the_log_of_a_former_one(small_config: Config, tmp_path: Path) -> None:
+    (tmp_path / "log.jsonl").write_text('{"step": 99}\n', "utf-8")
+    train.run(Trainer(replace(small_config, steps=1), None), tmp_path)
+    lines = (tmp_path / "log.jsonl").read_text("utf-8").splitlines()
+    assert [json.loads(line)["step"] for line in lines] == [1]
+
+
+def test_the_command_line_takes_a_template(
+    stand_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    own = tmp_path / "mine.yaml"
+    own.write_text(stand_file.read_text("utf-8"), "utf-8")
+    arguments = ["train", "mine.yaml", "--quick", "--device", "cpu", "--steps"]
+    monkeypatch.setattr("sys.argv", [*arguments, "2"])
+    train.main()
+    state = torch.load(tmp_path / "runs" / "mine" / "checkpoint.pt", weights_only=True)
+    assert state["step"] == 2
+    assert state["config"]["template"] == "mine.yaml"
+    assert (tmp_path / "runs" / "mine" / "mine.yaml").read_bytes() == own.read_bytes()
+    said = capsys.readouterr()
+    assert "step 1: vertices within .01/.02/.03: " in said.out
+    assert "2/2" in said.err
+    monkeypatch.setattr("sys.argv", [*arguments, "3", "--resume"])
+    train.main()
+    # A template that has changed meanwhile is another category.
+    own.write_text(stand_file.read_text("utf-8").replace("0.05, 0.2", "0.05, 0.3"), "utf-8")
+    monkeypatch.setattr("sys.argv", [*arguments, "4", "--resume"])
+    with pytest.raises(ValueError, match=r"mine\.yaml has changed since the run"):
+        train.main()
+
+
+def test_what_can_not_be_trained_ends_the_command_with_a_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("name: bad\nparts: {}\n", "utf-8")
+    monkeypatch.setattr("sys.argv", ["train", str(bad)])
+    with pytest.raises(SystemExit) as end:
+        train.main()
+    assert end.value.code == 1
+    assert "'parameters' is missing" in capsys.readouterr().err
