@@ -50,14 +50,14 @@ def _alone(spec: Mapping[str, Any], section: str) -> Iterator[tuple[str, Mapping
     if not isinstance(entries, Mapping):
         entries = {f"{number} ({text})": text for number, text in enumerate(entries, 1)}
     for name, entry in entries.items():
-        parameters = {name: entry} if section == "parameters" else _sound(spec["parameters"])
-        if not parameters:
-            continue
+        parameters = _sound(spec["parameters"])
         whole = {
             "name": "alone", "label": "", "points": 1, "parameters": parameters,
             "parts": {"probe": _probe(next(iter(parameters)))}, "keep": {"origin": [0, 0, 0]},
         }  # fmt: skip
-        if section == "relations":
+        if section == "parameters":
+            yield name, whole | {section: parameters | {str(name): entry}}
+        elif section == "relations":
             yield name, whole | {section: [entry]}
         else:
             yield name, whole | {section: {name: entry}}
