@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 from trimesh.exchange.export import export_mesh
 
 import service
@@ -156,6 +157,17 @@ def test_an_empty_edit_returns_the_very_bytes(
     assert edited.format == format
     assert edited.report["vertices"]["moved"] == 0
     assert edited.report["flipped_faces"] == 0
+
+
+def test_an_empty_edit_of_a_chair_that_leans_returns_the_very_bytes(
+    box_chair: trimesh.Trimesh, models: dict[str, Model]
+) -> None:
+    turn = Rotation.from_euler("xyz", [6.0, 9.0, 0.0], degrees=True).as_matrix()
+    leaning = trimesh.Trimesh(box_chair.vertices @ turn, box_chair.faces, process=False)
+    upload = Upload(bytes(leaning.export(file_type="glb", include_normals=True)), "chair.glb")
+    edited = change(upload, models, "{}")
+    assert any("leans" in warning for warning in edited.report["warnings"])
+    assert edited.data == upload.data
 
 
 @pytest.mark.parametrize("mode", ["blend", "paper"])

@@ -74,12 +74,12 @@ class Orientation:
         return points[:, axes] * signs
 
     def maps_to_own(self, maps: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Linear maps ``[n, 3, 3]`` of canonical space in the upload's own axes."""
+        """Linear maps ``[n, 3, 3]`` of canonical space in the upload's own axes; identities stay."""
         if self == CANONICAL:
             return maps
         if any(self.lean):
-            turn = self.rotation.astype(maps.dtype)
-            return np.asarray(turn.T @ maps @ turn)
+            turn, identity = self.rotation.astype(maps.dtype), np.eye(3, dtype=maps.dtype)
+            return np.asarray(turn.T @ (maps - identity) @ turn + identity)
         axes, signs = _columns(self._axes.T)
         return maps[:, axes][:, :, axes] * np.outer(signs, signs).astype(maps.dtype)
 

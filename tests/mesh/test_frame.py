@@ -68,6 +68,8 @@ def test_points_and_maps_go_there_and_back(way: Orientation, lean: np.ndarray) -
 def test_what_does_not_move_stays_where_it_is_to_the_last_bit() -> None:
     leaning = CANONICAL.leaning(np.array([0.1, -0.2, 0.05]))
     assert not leaning.to_own(np.zeros((4, 3))).any()
+    still = np.tile(np.eye(3, dtype=np.float32), (4, 1, 1))
+    assert np.array_equal(leaning.maps_to_own(still), still)
 
 
 @pytest.mark.parametrize("axis", AXES)
