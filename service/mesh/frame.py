@@ -74,7 +74,7 @@ class Orientation:
         return points[:, axes] * signs
 
     def maps_to_own(self, maps: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Linear maps ``[n, 3, 3]`` of canonical space in the upload's own axes; identities stay."""
+        """Linear maps ``[n, 3, 3]`` of canonical space in the upload's axes; identities stay."""
         if self == CANONICAL:
             return maps
         if any(self.lean):
