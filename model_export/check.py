@@ -48,22 +48,25 @@ def check(path: Path) -> tuple[AffineTemplate | None, list[Mistake]]:
 
 
 def draw_sheet(template: AffineTemplate, path: Path) -> None:
-    """Write the rest shape, each parameter's two extremes and the table of parameters as one PNG.
+    """Write the rest shape, its variants, each parameter's two extremes and the table of parameters
+    as one PNG.
 
     The rest shape is the middle of the shapes that keep the relations.  An extreme that breaks a
     relation is drawn nevertheless and says so.
     """
     rest = draws(template)[0]
-    rows = -(-len(template.names) // PAIRS)
+    usual, *others = template.variants
+    panels = [Panel(own.variant, [_mesh(own, rest, YELLOW)]) for own in others]
+    panels += [panel for index in range(len(rest)) for panel in _extremes(template, rest, index)]
+    rows = -(-len(panels) // (2 * PAIRS))
     figure = pyplot.figure(figsize=(11, 3.0 + 2.0 * rows), layout="constrained")
     above, below = figure.subfigures(2, 1, height_ratios=[3.0, 2.0 * rows])
     picture, table = above.subplots(1, 2, width_ratios=[1, 2.2])
-    draw(picture, Panel(f"{template.label} at rest", [_mesh(template, rest, YELLOW)]), view())
+    draw(picture, Panel(f"{template.label} at rest", [_mesh(usual, rest, YELLOW)]), view())
     _draw_table(table, template, rest)
     grid = below.subplots(rows, 2 * PAIRS, squeeze=False)
     for axes in grid.flat:
         axes.axis("off")
-    panels = [panel for index in range(len(rest)) for panel in _extremes(template, rest, index)]
     for axes, panel in zip(grid.flat, panels, strict=False):
         draw(axes, panel, view())
     figure.savefig(path, dpi=80)
@@ -78,6 +81,7 @@ def _mesh(
 
 def _extremes(template: AffineTemplate, rest: Array, index: int) -> list[Panel]:
     parameter = template.parameters[index]
+    own = next((own for own in template.variants if own.active[index]), template)
     panels = []
     for value, colour in ((parameter.low, GREY), (parameter.high, BLUE)):
         f = rest.copy()
@@ -85,7 +89,7 @@ def _extremes(template: AffineTemplate, rest: Array, index: int) -> list[Panel]:
         title = f"{parameter.name} = {value:g}"
         if template.broken_relations(f):
             title += "\n(breaks a relation)"
-        panels.append(Panel(title, [_mesh(template, f, colour)]))
+        panels.append(Panel(title, [_mesh(own, f, colour)]))
     return panels
 
 
@@ -104,9 +108,10 @@ def _draw_table(axes: Axes, template: AffineTemplate, rest: Array) -> None:
 
 def rest_mesh(template: AffineTemplate) -> trimesh.Trimesh:
     """The rest shape as a mesh in metres, standing on y = 0."""
-    vertices = template.decode(draws(template)[0])
+    usual = template.variants[0]
+    vertices = usual.decode(draws(template)[0])
     vertices = vertices - [0.0, vertices[:, 1].min(), 0.0]
-    return trimesh.Trimesh(vertices, template.faces, process=False)
+    return trimesh.Trimesh(vertices, usual.faces, process=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

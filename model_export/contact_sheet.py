@@ -28,7 +28,7 @@ def fit_panel(model: Model, shape: RealisticShape) -> Panel:
     """A real shape with its fitted template drawn over it."""
     found = _infer(model, shape)
     fit = found.best.estimate
-    template = model.template
+    template = fit.template
     fitted = template.decode(fit.parameters) + fit.translation
     return Panel(
         f"{shape.name[:30]}\n{fit.distance:.4f} (encoder {fit.encoder_distance:.4f})",

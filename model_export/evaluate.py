@@ -16,10 +16,8 @@ from model_export.config import SHIPPED
 from model_export.metrics import Recovery, recovery
 from model_export.realistic import CLOUD_SIZE, RealisticShape, find_shapes, load_cloud
 from model_export.synthetic import Augmentation, SyntheticShapes
-from service.encode.distance import Cloud
 from service.encode.estimate import Estimate, estimate
 from service.encode.model import Model, load_models
-from service.encode.refine import refine
 from service.mesh.formats import read_mesh
 from service.mesh.surface import Normalization, Samples, sample_surface
 
@@ -34,36 +32,40 @@ def clouds_of(shapes: Sequence[RealisticShape], cache: Path, points: int) -> lis
     return [Normalization.of(cloud).apply(cloud).astype(np.float32) for cloud in clouds]
 
 
-def synthetic_samples(model: Model, count: int) -> tuple[list[Samples], np.ndarray]:
-    """Clean surface samples of fresh draws, in metres, and their normalised labels."""
-    template = model.template
-    shapes = SyntheticShapes(template, Augmentation.none(), TEST_SEED)
-    parameters = shapes.draw_parameters(count)
-    visible = template.faces[~template.hidden]
+def synthetic_samples(model: Model, count: int) -> tuple[list[Samples], np.ndarray, np.ndarray]:
+    """Clean surface samples of fresh draws, in metres, their normalised labels and variants."""
+    shapes = SyntheticShapes(model.template, Augmentation.none(), TEST_SEED)
+    parameters, variant = shapes.draw_parameters(count), shapes.draw_variants(count).numpy()
     samples, labels = [], []
     for index, f in enumerate(parameters):
+        template = model.template.variants[variant[index]]
+        visible = template.faces[~template.hidden]
         rng = np.random.default_rng([TEST_SEED, index])
         drawn = sample_surface(template.decode(f), visible, model.points, rng)
         normalization = Normalization.of(drawn.points)
         samples.append(drawn)
         labels.append([*(f * normalization.scale), *(-normalization.center * normalization.scale)])
-    return samples, np.array(labels)
+    return samples, np.array(labels), variant
 
 
 def synthetic_table(model: Model, count: int) -> dict[str, Any]:
     """B1: recovery on template shapes by a constant, by the encoder, and with refinement."""
-    samples, labels = synthetic_samples(model, count)
+    samples, labels, variant = synthetic_samples(model, count)
+    names = list(model.template.present)
     encoded, refined = [], []
     for drawn in tqdm(samples, desc="synthetic", mininterval=2.0):
         normalization = Normalization.of(drawn.points)
-        points = normalization.apply(drawn.points)
-        f, t = model.encode(points)
-        fit = refine(model.template, f, t, Cloud(points, drawn.normals))
-        encoded.append([*f, *t])
-        refined.append([*fit.parameters, *fit.translation])
-    constant = np.tile(labels.mean(axis=0), (count, 1))
+        encoding = model.encode(normalization.apply(drawn.points))
+        fit = estimate(model, drawn)
+        told = [float(name == fit.template.variant) for name in names]
+        shares = encoding.shares if names else []
+        encoded.append([*encoding.parameters, *encoding.translation, *shares])
+        refined.append([*fit.parameters, *fit.translation, *told])
+    constant = np.tile([*labels.mean(axis=0), *np.zeros(len(names))], (count, 1))
     rows = {"constant": constant, "encoder": np.array(encoded), "refined": np.array(refined)}
-    table = {n: _summary(model, recovery(model.template, r, labels)) for n, r in rows.items()}
+    table = {
+        n: _summary(model, recovery(model.template, r, labels, variant)) for n, r in rows.items()
+    }
     return {"shapes": count, "thresholds": [0.01, 0.02, 0.03], **table}
 
 
@@ -71,6 +73,7 @@ def _summary(model: Model, result: Recovery) -> dict[str, Any]:
     return {
         "vertices_within_percent": [round(100 * share, 2) for share in result.within],
         "edited_within_percent": [round(100 * share, 2) for share in result.edited],
+        "variants_told_percent": round(100 * result.variants, 2),
         "mean_error_percent_of_range": {
             name: round(100 * float(error), 2)
             for name, error in zip(model.template.names, result.error, strict=True)
@@ -123,7 +126,7 @@ def truth_errors(model: Model, folder: Path, truth: Path) -> dict[str, dict[str,
         row = measured[shape.name]
         fit, samples = infer_shape(model, shape)
         points = fit.normalization.apply(samples.points)
-        answers = {"encoder": model.encode(points)[0], "refined": fit.parameters}
+        answers = {"encoder": model.encode(points).parameters, "refined": fit.parameters}
         for kind, parameters in answers.items():
             lengths = parameters / fit.normalization.scale
             values = dict(zip(model.template.names, lengths, strict=True))

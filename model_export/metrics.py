@@ -20,11 +20,13 @@ class Recovery:
             normalised frame of radius 0.6.
         edited: the same after a random edit of true and recovered parameters alike.
         error: ``[d]`` mean absolute error over the range, both in the normalised frame's units.
+        variants: share of shapes whose variant is told; 1 where there are none.
     """
 
     within: tuple[float, ...]
     edited: tuple[float, ...]
     error: np.ndarray
+    variants: float
 
     def row(self) -> str:
         """``within`` in percent, as the paper prints it."""
@@ -32,36 +34,47 @@ class Recovery:
 
 
 def recovery(
-    template: AffineTemplate, predicted: np.ndarray, true: np.ndarray, seed: int = 0
+    template: AffineTemplate,
+    predicted: np.ndarray,
+    true: np.ndarray,
+    variant: np.ndarray,
+    seed: int = 0,
 ) -> Recovery:
-    """Compare outputs with labels.
+    """Compare outputs with labels, on the parts that each shape has.
 
     Args:
         template: decodes both.
-        predicted, true: ``[n, d + 3]`` parameters and translation, normalised.
+        predicted: ``[n, d + 3 + K]`` parameters, translation and log odds of the variants.
+        true: ``[n, d + 3]``, both normalised.
+        variant: ``[n]`` of each shape.
         seed: of the edits: each parameter times exp U(ln 0.6, ln 1.67).
     """
     size = len(template.parameters)
     rng = np.random.default_rng(seed)
     factors = np.exp(rng.uniform(np.log(0.6), np.log(1.67), (len(true), size)))
     spread = true[:, :size].max(axis=0) - true[:, :size].min(axis=0)
+    gap = predicted[:, : size + 3] - true
+    active = np.stack([own.active for own in template.variants])[variant]
+    odds = predicted[:, size + 3 :]
     return Recovery(
-        within=_within(template, predicted, true, np.ones_like(factors)),
-        edited=_within(template, predicted, true, factors),
-        error=np.abs(predicted[:, :size] - true[:, :size]).mean(axis=0) / spread,
+        within=_within(template, gap, variant, np.ones_like(factors)),
+        edited=_within(template, gap, variant, factors),
+        error=(active * np.abs(gap[:, :size])).sum(axis=0) / active.sum(axis=0) / spread,
+        variants=float((odds.argmax(axis=1) == variant).mean()) if odds.size else 1.0,
     )
 
 
 def _within(
-    template: AffineTemplate, predicted: np.ndarray, true: np.ndarray, factors: np.ndarray
+    template: AffineTemplate, gap: np.ndarray, variant: np.ndarray, factors: np.ndarray
 ) -> tuple[float, ...]:
     size = factors.shape[1]
-    counts = np.zeros(len(THRESHOLDS))
-    for start in range(0, len(true), 100):
-        rows = slice(start, start + 100)
-        change = (predicted[rows, :size] - true[rows, :size]) * factors[rows]
-        shift = predicted[rows, size:] - true[rows, size:]
-        gap = np.einsum("vcd,nd->nvc", template.jacobian, change) + shift[:, None]
-        distance = np.linalg.norm(gap, axis=2).ravel()
-        counts += [(distance < threshold).sum() for threshold in THRESHOLDS]
-    return tuple(float(share) for share in counts / (len(true) * len(template.jacobian)))
+    counts, total = np.zeros(len(THRESHOLDS)), 0
+    for index, own in enumerate(template.variants):
+        shapes = np.flatnonzero(variant == index)
+        for rows in np.array_split(shapes, -(-len(shapes) // 100) or 1):
+            change, shift = gap[rows, :size] * factors[rows], gap[rows, size:]
+            moved = np.einsum("vcd,nd->nvc", own.jacobian, change) + shift[:, None]
+            distance = np.linalg.norm(moved, axis=2).ravel()
+            counts += [(distance < threshold).sum() for threshold in THRESHOLDS]
+            total += len(distance)
+    return tuple(float(share) for share in counts / total)

@@ -37,15 +37,20 @@ def refit(encoder: PointEncoder, template: AffineTemplate, config: Config, count
         seed = REFIT_SEED + number + 10 * config.seed
         shapes = SyntheticShapes(template, augmentation, seed, config.log_share)
         rows += [_features(encoder, shapes) for _ in range(max(1, size // CHUNK))]
-    features, labels = (torch.cat(column).double() for column in zip(*rows, strict=True))
-    last = _last(encoder)
-    weights = torch.cat([last.weight, last.bias[:, None]], dim=1).double().T
-    residual = (labels - encoder.mean) / encoder.spread - features @ weights
-    gram = features.T @ features / len(features)
-    ridge = RIDGE * torch.eye(len(gram), dtype=gram.dtype)
-    weights = weights + torch.linalg.solve(gram + ridge, features.T @ residual / len(features))
-    last.weight.copy_(weights[:-1].T)
-    last.bias.copy_(weights[-1])
+    features, labels, active = (torch.cat(column) for column in zip(*rows, strict=True))
+    features, labels = features.double(), labels.double()
+    last, size = _last(encoder), labels.shape[1]
+    weights = torch.cat([last.weight, last.bias[:, None]], dim=1).double().T[:, :size]
+    standard = (labels - encoder.mean[:size]) / encoder.spread[:size]
+    residual = standard - features @ weights
+    ridge = RIDGE * torch.eye(features.shape[1], dtype=features.dtype)
+    for output in range(size):
+        own = features[active[:, output]]
+        gram = own.T @ own / len(own) + ridge
+        aim = own.T @ residual[active[:, output], output] / len(own)
+        weights[:, output] += torch.linalg.solve(gram, aim)
+    last.weight[:size] = weights[:-1].T.float()
+    last.bias[:size] = weights[-1].float()
 
 
 def _last(encoder: PointEncoder) -> nn.Linear:
@@ -54,12 +59,14 @@ def _last(encoder: PointEncoder) -> nn.Linear:
     return last
 
 
-def _features(encoder: PointEncoder, shapes: SyntheticShapes) -> tuple[Tensor, Tensor]:
-    """What the last layer sees of a chunk of shapes, with a one for its bias; and the labels."""
+def _features(encoder: PointEncoder, shapes: SyntheticShapes) -> tuple[Tensor, Tensor, Tensor]:
+    """What the last layer sees of a chunk of shapes, with a one for its bias; the labels; and which
+    of them say anything, in each shape's variant."""
     batch = shapes.batch(CHUNK, shapes.template.points)
     seen: list[Tensor] = []
     hook = _last(encoder).register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]))
     encoder(batch.points)
     hook.remove()
     features = torch.cat([seen[0], torch.ones(len(seen[0]), 1)], dim=1)
-    return features, torch.cat([batch.parameters, batch.translation], dim=1)
+    active = torch.tensor([[*own.active, True, True, True] for own in shapes.template.variants])
+    return features, batch.labels, active[batch.variant]

@@ -61,17 +61,19 @@ def _read_log(path: Path) -> list[dict[str, Any]]:
 
 def drawn_panels(model: Model, count: int) -> list[Panel]:
     """Fresh template shapes with the fits to their samples drawn over them."""
-    template = model.template
-    samples, labels = synthetic_samples(model, count)
-    visible = template.faces[~template.hidden]
-    size = len(template.parameters)
+    size = len(model.template.parameters)
     panels = []
-    for number, (drawn, label) in enumerate(zip(samples, labels, strict=True), 1):
-        fit = estimate(model, drawn)
-        true = template.decode(label[:size]) + label[size:]
-        fitted = template.decode(fit.parameters) + fit.translation
+    for number, (drawn, label, variant) in enumerate(
+        zip(*synthetic_samples(model, count), strict=True), 1
+    ):
+        fit, own = estimate(model, drawn), model.template.variants[variant]
+        true = own.decode(label[:size]) + label[size:]
+        fitted = fit.template.decode(fit.parameters) + fit.translation
         title = f"draw {number}\n{fit.distance:.4f} (encoder {fit.encoder_distance:.4f})"
-        meshes = [(true, visible, YELLOW, 1.0), (fitted, visible, BLUE, 0.25)]
+        meshes = [
+            (true, own.faces[~own.hidden], YELLOW, 1.0),
+            (fitted, fit.template.faces[~fit.template.hidden], BLUE, 0.25),
+        ]
         panels.append(Panel(title, meshes))
     return panels
 

@@ -18,8 +18,8 @@ def sample_faces(
     weight: Tensor,
     points: int,
     generator: torch.Generator | None = None,
-) -> Tensor:
-    """Draw ``[B, points, 3]`` points on the faces.
+) -> tuple[Tensor, Tensor]:
+    """Draw ``[B, points, 3]`` points on the faces, and ``[B, points]`` which face each is on.
 
     Args:
         vertices: ``[B, V, 3]``.
@@ -40,4 +40,4 @@ def sample_faces(
     index = face[..., None].expand(-1, -1, 3)
     a, b, c = (vertices[:, faces[:, corner]].gather(1, index) for corner in range(3))
     root, v = rand(count, points, 1).sqrt(), rand(count, points, 1)
-    return (1 - root) * a + root * (1 - v) * b + root * v * c
+    return (1 - root) * a + root * (1 - v) * b + root * v * c, face

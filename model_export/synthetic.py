@@ -45,11 +45,18 @@ class Batch:
         points: ``[B, n, 3]``.
         parameters: ``[B, d]``, lengths times the shape's normalising scale.
         translation: ``[B, 3]`` position of the template's origin.
+        variant: ``[B]`` int64, of the template's variants; 0 where it has none.
     """
 
     points: Tensor
     parameters: Tensor
     translation: Tensor
+    variant: Tensor
+
+    @property
+    def labels(self) -> Tensor:
+        """``[B, d + 3]`` parameters and translation."""
+        return torch.cat([self.parameters, self.translation], dim=1)
 
 
 class SyntheticShapes:
@@ -81,6 +88,7 @@ class SyntheticShapes:
         self.faces = torch.as_tensor(template.faces, device=device)
         self.face_part = torch.as_tensor(template.part[template.faces[:, 0]], device=device)
         self.hidden = torch.as_tensor(template.hidden, device=device)
+        self.present = torch.as_tensor(present_parts(template), device=device)
 
     def draw_parameters(self, count: int) -> np.ndarray:
         """``[count, d]`` parameters in metres that keep the template's relations."""
@@ -104,11 +112,16 @@ class SyntheticShapes:
     def batch(self, count: int, points: int) -> Batch:
         """Fresh clouds of ``points`` points with their labels."""
         f = torch.as_tensor(self.draw_parameters(count), dtype=torch.float32, device=self.device)
-        return self.sample(f, points)
+        return self.sample(f, self.draw_variants(count), points)
 
-    def sample(self, f: Tensor, points: int) -> Batch:
-        """Clouds of the shapes with parameters ``f [B, d]``."""
-        cloud = self._sample_points(self._decode(f), points)
+    def draw_variants(self, count: int) -> Tensor:
+        """``[count]`` variants, each as often as the others."""
+        size = (count,)
+        return torch.randint(len(self.present), size, generator=self.generator, device=self.device)
+
+    def sample(self, f: Tensor, variant: Tensor, points: int) -> Batch:
+        """Clouds of the shapes with parameters ``f [B, d]`` and variants ``[B]``."""
+        cloud = self._sample_points(self._decode(f), self.present[variant], points)
         cloud = self._clutter(cloud)
         cloud = self._noise(cloud)
         center = cloud.mean(dim=1, keepdim=True)
@@ -118,6 +131,7 @@ class SyntheticShapes:
             points=cloud * scale[:, None, None],
             parameters=f * scale[:, None],
             translation=-center[:, 0] * scale[:, None],
+            variant=variant,
         )
 
     def _decode(self, f: Tensor) -> Tensor:
@@ -129,20 +143,20 @@ class SyntheticShapes:
     def _randn(self, *shape: int) -> Tensor:
         return torch.randn(*shape, generator=self.generator, device=self.device)
 
-    def _density(self, count: int) -> Tensor:
-        """``[B, F]`` relative sampling density of the faces."""
-        parts = len(self.template.parts)
+    def _density(self, present: Tensor) -> Tensor:
+        """``[B, F]`` relative sampling density of the faces, for parts ``present [B, P]``."""
+        count, parts = present.shape
         settings = self.augmentation
         part = torch.exp(settings.uneven * self._randn(count, parts))
         part = part * (self._rand(count, parts) >= settings.drop_part)
-        part = part + 1e-6
+        part = (part + 1e-6) * present
         density = part[:, self.face_part]
         closed = self._rand(count, 1) >= settings.hidden
         return torch.where(self.hidden & closed, 0.0, density)
 
-    def _sample_points(self, vertices: Tensor, points: int) -> Tensor:
-        weight = face_areas(vertices, self.faces) * self._density(len(vertices))
-        return sample_faces(vertices, self.faces, weight, points, self.generator)
+    def _sample_points(self, vertices: Tensor, present: Tensor, points: int) -> Tensor:
+        weight = face_areas(vertices, self.faces) * self._density(present)
+        return sample_faces(vertices, self.faces, weight, points, self.generator)[0]
 
     def _clutter(self, cloud: Tensor) -> Tensor:
         """Move a share of points onto a few random boxes inside the cloud's bounding box.
@@ -174,3 +188,10 @@ class SyntheticShapes:
         radius = (cloud - cloud.mean(1, keepdim=True)).norm(dim=2).amax(1)[:, None, None]
         level = self.augmentation.noise * self._rand(len(cloud), 1, 1) ** 2
         return cloud + level * radius * self._randn(*cloud.shape)
+
+
+def present_parts(template: AffineTemplate) -> np.ndarray:
+    """``[K, P]`` bool, the parts of each variant; all of them where there are none."""
+    if not template.present:
+        return np.ones((1, len(template.parts)), bool)
+    return np.stack(list(template.present.values()))

@@ -175,16 +175,17 @@ def require_scale_free(template: AffineTemplate) -> None:
 
 
 def label_statistics(template: AffineTemplate, config: Config) -> tuple[torch.Tensor, torch.Tensor]:
-    """``[d + 3]`` mean and standard deviation of normalised labels."""
+    """``[d + 3 + K]`` mean and standard deviation of normalised labels; 0 and 1 for log odds."""
     shapes = SyntheticShapes(template, config.augmentation, config.seed + 1, config.log_share)
-    batch = shapes.batch(4096 // 4, 256)
-    labels = torch.cat([batch.parameters, batch.translation], dim=1)
-    return labels.mean(dim=0), labels.std(dim=0).clamp_min(1e-3)
+    labels = shapes.batch(4096 // 4, 256).labels
+    odds = torch.zeros(len(template.present))
+    mean, spread = labels.mean(dim=0), labels.std(dim=0).clamp_min(1e-3)
+    return torch.cat([mean, odds]), torch.cat([spread, odds + 1.0])
 
 
 @torch.no_grad()
 def predict(encoder: PointEncoder, points: torch.Tensor) -> np.ndarray:
-    """``[n, d + 3]`` outputs in evaluation mode."""
+    """``[n, d + 3 + K]`` outputs in evaluation mode."""
     encoder.eval()
     chunks = [encoder(chunk) for chunk in points.split(25)]
     return torch.cat(chunks).cpu().numpy()
@@ -198,14 +199,14 @@ def validation_set(template: AffineTemplate, count: int) -> Batch:
 
 
 def _columns(batch: Batch) -> tuple[torch.Tensor, ...]:
-    return batch.points, batch.parameters, batch.translation
+    return batch.points, batch.parameters, batch.translation, batch.variant
 
 
 def validate(encoder: PointEncoder, template: AffineTemplate, batch: Batch) -> Recovery:
     """B1 of the encoder alone."""
     device = encoder.mean.device
-    true = torch.cat([batch.parameters, batch.translation], dim=1).numpy()
-    return recovery(template, predict(encoder, batch.points.to(device)), true)
+    predicted = predict(encoder, batch.points.to(device))
+    return recovery(template, predicted, batch.labels.numpy(), batch.variant.numpy())
 
 
 def run(trainer: Trainer, folder: Path, every: int = 1000, until: int | None = None) -> Recovery:
@@ -229,7 +230,8 @@ def run(trainer: Trainer, folder: Path, every: int = 1000, until: int | None = N
             torch.save(trainer.state(), folder / "checkpoint.part")
             (folder / "checkpoint.part").replace(folder / "checkpoint.pt")
             line = {"step": trainer.step, "seconds": round(trainer.seconds), **means,
-                    "within": result.within, "edited": result.edited}  # fmt: skip
+                    "within": result.within, "edited": result.edited,
+                    "variants": result.variants}  # fmt: skip
             with (folder / "log.jsonl").open("a") as log:
                 log.write(json.dumps(line) + "\n")
             shown = f"{result.row()} %"

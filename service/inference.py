@@ -74,7 +74,8 @@ class Inference:
 
     def dimensions(self, jacobian: NDArray[np.floating] | None = None) -> Dimensions:
         """The mesh's dimensions in the reported unit; with a Jacobian, as they can be changed."""
-        return Dimensions(self.model.template, self.parameters, self.vertices, self.scale, jacobian)
+        template = self.best.estimate.template
+        return Dimensions(template, self.parameters, self.vertices, self.scale, jacobian)
 
     def describe_model(self) -> dict[str, str]:
         """Which model it was."""
@@ -108,6 +109,7 @@ class Inference:
             "fit": {
                 "distance": fit.distance,
                 "encoder_distance": fit.encoder_distance,
+                "variant": fit.template.variant or None,
                 "in_distribution": self.in_distribution,
                 "score": best.score,
                 "candidates": [

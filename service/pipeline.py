@@ -82,7 +82,7 @@ def edit(
     outcome = dimensions.outcome(edits, edit_options.strict)
     after = outcome.parameters
     change = np.where(after == found.parameters, 0.0, (after - found.parameters) * found.scale)
-    _, anchor = found.model.template.anchor(keep)
+    _, anchor = found.best.estimate.template.anchor(keep)
     turn, scale = found.best.orientation, found.best.estimate.normalization.scale
     shift = turn.to_own((binding.displace(change) - anchor @ change) / scale)
     linear = turn.maps_to_own(binding.linear(change))
@@ -140,7 +140,7 @@ def _anchor(model: Model, keep: str | None) -> str:
 def _bind(found: Inference, mode: str) -> Binding:
     rule = blend.bind if mode == "blend" else paper.bind
     fit = found.best.estimate
-    template = following(found.model.template, fit.parameters)
+    template = following(fit.template, fit.parameters)
     return rule(found.vertices, found.mesh.faces, template, fit.parameters, fit.translation)
 
 

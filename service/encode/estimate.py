@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from service.encode.distance import Cloud, surface_distance
-from service.encode.model import Model
+from service.encode.model import STEEPNESS, Encoding, Model
 from service.encode.refine import STANDARD, Settings, refine
 from service.mesh.surface import Normalization, Samples, sample_surface
 from service.template.affine import AffineTemplate
@@ -28,6 +28,9 @@ OPPOSED = -0.3
 out."""
 SIGMA_ENCODER = 0.04
 """Standard deviation claimed for the encoder alone, likewise."""
+CHOICES, DOUBT = 2, 0.02
+"""Variants of the template that are fitted at most, and how likely the second must seem beside the
+first."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,7 @@ class Estimate:
     """Parameters of a shape in its normalised canonical frame.
 
     Attributes:
+        template: the variant of the category's template that the shape is one of.
         parameters: ``[d]``.
         translation: ``[3]`` of the template's origin.
         sigma: ``[d]`` standard deviations.
@@ -44,6 +48,7 @@ class Estimate:
         inside_out: the upload's faces are wound the wrong way round, as a mirrored mesh's are.
     """
 
+    template: AffineTemplate
     parameters: Array
     translation: Array
     sigma: Array
@@ -65,42 +70,70 @@ def estimate(
     Args:
         model: the category.
         samples: `model.points` samples in canonical orientation, any scale and place.
-        refined: go on from the encoder's answer by refinement.
+        refined: go on from the encoder's answer by refinement; where several variants of the
+            template are likely, of each, and take the one that fits.
         settings: of the refinement.
         stride: every so-many-th sample is refined and measured on; the encoder sees them all.
     """
     normalization = Normalization.of(samples.points)
     points = normalization.apply(samples.points)
-    parameters, translation = model.encode(points)
+    encoding = model.encode(points)
+    order = np.argsort(-encoding.shares, kind="stable")
+    likeliest = model.template.variants[order[0]]
     # Samples come in the order of the faces, so that every so-many-th is a fair draw.
     cloud = Cloud(points[::stride], samples.normals[::stride])
-    inside_out = opposes(model.template, parameters, translation, cloud)
+    inside_out = opposes(likeliest, encoding, cloud)
     if inside_out:
         cloud = Cloud(cloud.points, -cloud.normals)
-    distance = surface_distance(model.template, parameters, translation, cloud)
-    sigma = np.full(len(parameters), SIGMA_ENCODER)
-    encoded = Estimate(
-        parameters, translation, sigma, distance, distance, normalization, inside_out
-    )
     if not refined:
-        return encoded
-    fit = refine(model.template, parameters, translation, cloud, settings)
-    fitted = surface_distance(model.template, fit.parameters, fit.translation, cloud)
-    if fitted > DIVERGED * distance:
-        return encoded
+        return _encoded(likeliest, encoding, cloud, normalization, inside_out)
+    fits = []
+    for index in order[:CHOICES]:
+        if encoding.shares[index] < DOUBT * encoding.shares[order[0]]:
+            continue
+        variant = model.template.variants[index]
+        start = _encoded(variant, encoding, cloud, normalization, inside_out)
+        fit = _refined(start, cloud, settings)
+        # As in recognition: how likely it seemed, and how well it fits.
+        fits.append((encoding.shares[index] * fit.distance**-STEEPNESS, fit))
+    return max(fits, key=lambda pair: pair[0])[1]
+
+
+def _encoded(
+    variant: AffineTemplate,
+    encoding: Encoding,
+    cloud: Cloud,
+    normalization: Normalization,
+    inside_out: bool,
+) -> Estimate:
+    """The encoder's answer, for one variant."""
+    parameters, translation = encoding.parameters, encoding.translation
+    distance = surface_distance(variant, parameters, translation, cloud)
+    sigma = np.full(len(parameters), SIGMA_ENCODER)
+    return Estimate(
+        variant, parameters, translation, sigma, distance, distance, normalization, inside_out
+    )
+
+
+def _refined(start: Estimate, cloud: Cloud, settings: Settings) -> Estimate:
+    """A fit from the encoder's answer on, unless it goes astray."""
+    fit = refine(start.template, start.parameters, start.translation, cloud, settings)
+    distance = surface_distance(start.template, fit.parameters, fit.translation, cloud)
+    if distance > DIVERGED * start.distance:
+        return start
     return replace(
-        encoded,
+        start,
         parameters=fit.parameters,
         translation=fit.translation,
         sigma=np.hypot(fit.sigma, SIGMA_FLOOR),
-        distance=fitted,
+        distance=distance,
     )
 
 
-def opposes(template: AffineTemplate, parameters: Array, translation: Array, cloud: Cloud) -> bool:
+def opposes(template: AffineTemplate, encoding: Encoding, cloud: Cloud) -> bool:
     """Whether a cloud's normals point into the shape that the template says it is."""
     visible = template.faces[~template.hidden]
-    vertices = template.decode(parameters) + translation
+    vertices = template.decode(encoding.parameters) + encoding.translation
     samples = sample_surface(vertices, visible, PROBES, np.random.default_rng(3))
     step = max(1, len(cloud.points) // PROBES)
     nearest = cKDTree(samples.points).query(cloud.points[::step])[1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,21 @@ SMALLEST = 1e-3
 """Least length in the normalised frame, where the shape has radius 0.6."""
 
 
+@dataclass(frozen=True)
+class Encoding:
+    """An encoder's answer, in the normalised frame.
+
+    Attributes:
+        parameters: ``[d]``, sizes no smaller than `SMALLEST`; signed offsets are as they come.
+        translation: ``[3]`` of the template's origin.
+        shares: ``[K]`` probabilities of the template's variants.
+    """
+
+    parameters: NDArray[np.float64]
+    translation: NDArray[np.float64]
+    shares: NDArray[np.float64]
+
+
 class Model:
     """A category that the service can infer and edit."""
 
@@ -45,16 +61,17 @@ class Model:
         """Size of the clouds that it encodes."""
         return self._session.points
 
-    def encode(
-        self, points: NDArray[np.floating]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Parameters ``[d]`` and translation ``[3]`` of a normalised cloud ``[points, 3]``.
-
-        Sizes are kept above `SMALLEST`; signed offsets are as they come.
-        """
+    def encode(self, points: NDArray[np.floating]) -> Encoding:
+        """What the encoder answers for a normalised cloud ``[points, 3]``."""
         outputs = self._session.run(points)
         size = len(self.template.parameters)
-        return positive(self.template, outputs[:size]), outputs[size:]
+        odds = outputs[size + 3 :] if self.template.present else np.zeros(1)
+        shares = np.exp(odds - odds.max())
+        return Encoding(
+            parameters=positive(self.template, outputs[:size]),
+            translation=outputs[size : size + 3],
+            shares=shares / shares.sum(),
+        )
 
     @property
     def limit_distance(self) -> float:

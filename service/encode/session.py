@@ -56,7 +56,8 @@ def cloud_size(session: onnxruntime.InferenceSession, path: Path, single: bool) 
 
 
 class EncoderSession:
-    """A loaded encoder: one cloud of a fixed size in, ``d + 3`` numbers out."""
+    """A loaded encoder: one cloud of a fixed size in; parameters, translation and the log odds of
+    the template's variants, where it has any, out."""
 
     def __init__(self, path: Path, threads: int = 1) -> None:
         """
@@ -71,7 +72,7 @@ class EncoderSession:
         self.points = cloud_size(self._session, path, single=True)
 
     def run(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
-        """``[points, 3]`` normalised cloud to ``[d + 3]`` outputs."""
+        """``[points, 3]`` normalised cloud to ``[d + 3 + K]`` outputs."""
         cloud = np.ascontiguousarray(points, dtype=np.float32)[None]
         (outputs,) = self._session.run(None, {"points": cloud})
         return np.asarray(outputs[0], dtype=np.float64)

@@ -6,7 +6,9 @@ out.  `base` and `jacobian` are plain arrays, so numpy and torch decode from the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +44,9 @@ class AffineTemplate:
         taper_base, taper_jacobian: ``[P, 3, 3]`` and ``[P, 3, 3, d]``.
         run: ``[P]`` int64, the axis along which each part tapers and leans.
         anchors: ``[1 + d]`` rows a coordinate, by name: points an edit can hold in place.
+        present: which parts each variant has, ``[P]`` by its name, the usual variant first; empty
+            where all shapes have all parts.
+        variant: which of them this one is, restricted to its parts; empty for the whole.
     """
 
     name: str
@@ -63,6 +68,59 @@ class AffineTemplate:
     taper_jacobian: Array
     run: NDArray[np.int64]
     anchors: dict[str, Array]
+    present: dict[str, NDArray[np.bool_]]
+    variant: str = ""
+
+    @cached_property
+    def variants(self) -> tuple[AffineTemplate, ...]:
+        """The template of each variant, with its own parts only: what a shape is fitted by.
+
+        They share the parameters; one that moves none of a variant's parts is idle there.
+        """
+        if not self.present:
+            return (self,)
+        return tuple(self._restricted(name, has) for name, has in self.present.items())
+
+    def _restricted(self, name: str, has: NDArray[np.bool_]) -> AffineTemplate:
+        own_vertex, own_face = has[self.part], has[self.part[self.faces[:, 0]]]
+        vertex, part = np.cumsum(own_vertex) - 1, np.cumsum(has) - 1
+        return replace(
+            self,
+            base=self.base[own_vertex],
+            jacobian=self.jacobian[own_vertex],
+            faces=vertex[self.faces[own_face]],
+            part=part[self.part[own_vertex]],
+            parts=tuple(np.array(self.parts)[has].tolist()),
+            hidden=self.hidden[own_face],
+            frame_base=self.frame_base[has],
+            frame_jacobian=self.frame_jacobian[has],
+            taper_base=self.taper_base[has],
+            taper_jacobian=self.taper_jacobian[has],
+            run=self.run[has],
+            present={},
+            variant=name,
+        )
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """``[d]`` the parameters that move anything."""
+        return np.asarray(self.jacobian.any(axis=(0, 1)))
+
+    def vector(self, values: Mapping[str, float]) -> Array:
+        """Parameters ``[d]`` by their names.
+
+        Nuisance parameters that are not named are 0, or where they may not be the end of their
+        range that is nearest to it.
+
+        Raises:
+            KeyError: for a public parameter that is missing.
+        """
+        return np.array(
+            [
+                values.get(p.name, min(max(p.low, 0.0), p.high)) if p.nuisance else values[p.name]
+                for p in self.parameters
+            ]
+        )
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from service.template.affine import AffineTemplate
 from service.template.expressions import ExpressionError, parse_affine, parse_rows
@@ -60,6 +61,7 @@ def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:
             relations=parse_rows(spec.get("relations", []), names),
             relation_texts=tuple(map(str, spec.get("relations", []))),
             anchors={name: parse_rows(point, names) for name, point in spec["keep"].items()},
+            present=_variants(spec.get("variants", {}), spec["parts"], parts),
             **_assemble(parts),
         )
     except KeyError as error:
@@ -70,6 +72,27 @@ def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:
         raise
     except (AttributeError, TypeError, ValueError) as error:
         raise TemplateError(f"an entry has the wrong form: {error}") from error
+
+
+def _variants(
+    entries: Mapping[str, Mapping[str, Any]], files: Mapping[str, Any], parts: Sequence[Part]
+) -> dict[str, NDArray[np.bool_]]:
+    """Which parts each variant has.  A part that it is `without` takes its mirrored copies along.
+
+    Raises:
+        TemplateError: for a part that there is none of, or a variant of no parts.
+    """
+    present = {}
+    for name, entry in entries.items():
+        absent: set[str] = set()
+        for part in entry.get("without") or []:
+            if part not in files:
+                raise TemplateError(f"variant {name!r}: no part is named {part!r}")
+            absent |= {part, *files[part].get("mirror", {})}
+        present[str(name)] = np.array([part.name not in absent for part in parts])
+        if not present[str(name)].any():
+            raise TemplateError(f"variant {name!r} has no parts")
+    return present
 
 
 def _assemble(parts: Sequence[Part]) -> dict[str, Any]:

@@ -43,7 +43,8 @@ def test_size_and_place_make_no_difference(chair_model: Model, chair_samples: Sa
 def test_unrefined_it_is_the_encoders_answer(chair_model: Model, chair_samples: Samples) -> None:
     answer = estimate(chair_model, chair_samples, refined=False)
     points = answer.normalization.apply(chair_samples.points)
-    parameters, translation = chair_model.encode(points)
+    encoding = chair_model.encode(points)
+    parameters, translation = encoding.parameters, encoding.translation
     np.testing.assert_array_equal(answer.parameters, parameters)
     np.testing.assert_array_equal(answer.translation, translation)
     assert answer.sigma.tolist() == [SIGMA_ENCODER] * 8

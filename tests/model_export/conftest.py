@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+import yaml
 
 from model_export.config import Config
 from model_export.synthetic import Augmentation
 from service.template.affine import AffineTemplate
-from service.template.loader import load_template
+from service.template.loader import compile_template, load_template
 
 STAND = """
 # A slab on a post; the post's bottom is hidden, though nothing covers it.
@@ -48,7 +49,8 @@ def _one_thread() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def chair() -> AffineTemplate:
-    return load_template("chair")
+    """The paper's, of eight parameters."""
+    return load_template("paper_chair")
 
 
 @pytest.fixture(scope="session")
@@ -61,6 +63,15 @@ def stand_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def stand(stand_file: Path) -> AffineTemplate:
     return load_template(stand_file)
+
+
+@pytest.fixture(scope="session")
+def kinds() -> AffineTemplate:
+    """A slab on a post or on the floor: the post's height is idle in the second."""
+    spec = yaml.safe_load(STAND)
+    spec["parameters"]["post_height"]["nuisance"] = True
+    spec["variants"] = {"high": {}, "low": {"without": ["post"]}}
+    return compile_template(spec)
 
 
 @pytest.fixture(scope="session")

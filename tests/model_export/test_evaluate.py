@@ -9,6 +9,7 @@ import pytest
 
 from model_export import evaluate
 from model_export.realistic import find_shapes, load_cloud
+from service.encode.model import Encoding
 from service.mesh.surface import Normalization
 from service.template.affine import AffineTemplate
 
@@ -23,10 +24,10 @@ class MeanModel:
     def __init__(self, template: AffineTemplate) -> None:
         self.template = template
 
-    def encode(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def encode(self, points: np.ndarray) -> Encoding:
         assert points.shape == (self.points, 3)
         assert np.linalg.norm(points, axis=1).max() == pytest.approx(0.6)
-        return self.answer, self.place
+        return Encoding(self.answer, self.place, np.ones(1))
 
 
 @pytest.fixture
@@ -50,8 +51,9 @@ def test_clouds_of_real_shapes_are_normalised(meshes: Path, tmp_path: Path) -> N
 
 
 def test_synthetic_samples_agree_with_their_labels(model: Any, stand: AffineTemplate) -> None:
-    samples, labels = evaluate.synthetic_samples(model, 6)
+    samples, labels, variant = evaluate.synthetic_samples(model, 6)
     assert labels.shape == (6, 6)
+    assert variant.tolist() == [0] * 6
     for drawn, label in zip(samples, labels, strict=True):
         assert drawn.points.shape == (300, 3)
         normalised = Normalization.of(drawn.points).apply(drawn.points)

@@ -9,6 +9,9 @@ from model_export.losses import Losses, Weights, draw_edit, total
 from model_export.synthetic import Batch
 from service.template.affine import AffineTemplate
 
+ONLY = torch.zeros(4, dtype=torch.int64)
+"""Four times the only variant."""
+
 
 @pytest.fixture(scope="module")
 def losses(chair: AffineTemplate) -> Losses:
@@ -29,7 +32,7 @@ def predicted(labels: Tensor) -> Tensor:
 
 
 def as_batch(labels: Tensor) -> Batch:
-    return Batch(torch.zeros(4, 1, 3), labels[:, :8], labels[:, 8:])
+    return Batch(torch.zeros(4, 1, 3), labels[:, :8], labels[:, 8:], ONLY)
 
 
 def test_torch_and_numpy_decode_alike(
@@ -49,8 +52,8 @@ def test_the_semantic_loss_is_the_mean_square_in_deviations(
         for i in range(4)
         for j in range(11)
     ]
-    assert losses.semantic(predicted, labels).item() == pytest.approx(np.mean(squares), rel=1e-5)
-    assert losses.semantic(labels, labels).item() == 0.0
+    assert losses.semantic(predicted, labels, ONLY).item() == pytest.approx(np.mean(squares), rel=1e-5)
+    assert losses.semantic(labels, labels, ONLY).item() == 0.0
 
 
 def test_the_reconstruction_loss_is_the_mean_squared_vertex_distance(
@@ -60,7 +63,7 @@ def test_the_reconstruction_loss_is_the_mean_squared_vertex_distance(
     for p, t in zip(predicted.double().numpy(), labels.double().numpy(), strict=True):
         gap = chair.decode(p[:8]) + p[8:] - chair.decode(t[:8]) - t[8:]
         distances += [float(row @ row) for row in gap]
-    assert losses.reconstruction(predicted, labels).item() == pytest.approx(
+    assert losses.reconstruction(predicted, labels, ONLY).item() == pytest.approx(
         np.mean(distances), rel=1e-4
     )
 
@@ -71,9 +74,9 @@ def test_a_shared_addition_changes_neither_loss(
     # Why the editing branch multiplies: an additive edit would train nothing new.
     added = torch.linspace(-0.2, 0.4, 11)
     for loss in (losses.semantic, losses.reconstruction):
-        plain = loss(predicted, labels).item()
-        assert loss(predicted + added, labels + added).item() == pytest.approx(plain, rel=1e-3)
-        doubled = loss(predicted * 2, labels * 2).item()
+        plain = loss(predicted, labels, ONLY).item()
+        assert loss(predicted + added, labels + added, ONLY).item() == pytest.approx(plain, rel=1e-3)
+        doubled = loss(predicted * 2, labels * 2, ONLY).item()
         assert doubled == pytest.approx(4 * plain, rel=1e-4)
 
 
@@ -95,10 +98,10 @@ def test_the_editing_branch_edits_prediction_and_truth_alike(
     edited, target = predicted.clone(), labels.clone()
     edited[:, :8] *= factors
     target[:, :8] *= factors
-    assert torch.equal(terms["sem"], losses.semantic(predicted, labels))
-    assert torch.equal(terms["rec"], losses.reconstruction(predicted, labels))
-    assert torch.allclose(terms["sem_edit"], losses.semantic(edited, target))
-    assert torch.allclose(terms["rec_edit"], losses.reconstruction(edited, target))
+    assert torch.equal(terms["sem"], losses.semantic(predicted, labels, ONLY))
+    assert torch.equal(terms["rec"], losses.reconstruction(predicted, labels, ONLY))
+    assert torch.allclose(terms["sem_edit"], losses.semantic(edited, target, ONLY))
+    assert torch.allclose(terms["rec_edit"], losses.reconstruction(edited, target, ONLY))
     assert set(losses.synthetic(predicted, as_batch(labels), None)) == {"sem", "rec"}
 
 
@@ -127,7 +130,7 @@ def test_edits_repeat_with_the_seed() -> None:
 def test_the_similarity_loss_is_the_two_way_squared_chamfer(losses: Losses, labels: Tensor) -> None:
     clouds = 0.5 * torch.randn(4, 60, 3, generator=torch.Generator().manual_seed(4))
     torch.manual_seed(5)
-    samples = losses._sample(losses.decode(labels), 40).double().numpy()
+    samples = losses._sample(losses.decode(labels), 40)[0].double().numpy()
     torch.manual_seed(5)
     value = losses.similarity(labels, clouds, points=40).item()
     there, back = [], []
@@ -144,7 +147,7 @@ def test_template_samples_lie_on_its_visible_faces_by_area(
     f = torch.tensor([[0.4, 0.04, 0.06, 0.45, 0.48, 0.4, 0.16, 0.16, 0.1, 0.2, 0.3]])
     torch.manual_seed(6)
     vertices = losses.decode(f)
-    samples = losses._sample(vertices, 20_000)[0].double().numpy()
+    samples = losses._sample(vertices, 20_000)[0][0].double().numpy()
     low, high = vertices[0].numpy().min(axis=0), vertices[0].numpy().max(axis=0)
     assert (samples >= low - 1e-6).all()
     assert (samples <= high + 1e-6).all()
@@ -160,7 +163,7 @@ def test_template_samples_lie_on_its_visible_faces_by_area(
 
 def test_the_similarity_loss_pulls_towards_the_cloud(losses: Losses, labels: Tensor) -> None:
     torch.manual_seed(7)
-    clouds = losses._sample(losses.decode(labels), 400)
+    clouds = losses._sample(losses.decode(labels), 400)[0]
     shifted = labels.clone()
     shifted[:, 8] += 0.2
     shifted.requires_grad_()
@@ -175,11 +178,60 @@ def test_the_objective_weighs_its_terms() -> None:
     terms = {
         name: torch.tensor(value)
         for name, value in {
-            "sem": 1.0, "sem_edit": 10.0, "rec": 100.0, "rec_edit": 1e3, "sim": 1e4
+            "sem": 1.0, "sem_edit": 10.0, "rec": 100.0, "rec_edit": 1e3, "sim": 1e4, "variant": 1e5
         }.items()
     }  # fmt: skip
-    assert total(terms, Weights()).item() == pytest.approx(0.3 * 11 + 30 * 1100 + 50 * 1e4)
-    assert total(terms, Weights(1.0, 0.0, 0.0)).item() == pytest.approx(11)
+    weighed = 0.3 * 11 + 30 * 1100 + 50 * 1e4 + 0.1 * 1e5
+    assert total(terms, Weights()).item() == pytest.approx(weighed)
+    assert total(terms, Weights(1.0, 0.0, 0.0, 0.0)).item() == pytest.approx(11)
     assert total({"sem": torch.tensor(2.0)}, Weights()).item() == pytest.approx(0.6)
     with pytest.raises(KeyError):
         total({"other": torch.tensor(2.0)}, Weights())
+
+
+def test_what_a_variant_lacks_does_not_count(kinds: AffineTemplate) -> None:
+    own = Losses(kinds, torch.ones(8))
+    true = torch.tensor([[1.0, 0.1, 0.8, 0.0, 0.0, 0.0]]).expand(2, -1)
+    predicted = true.clone()
+    predicted[:, 2] += 0.3
+    high, low = torch.tensor([0, 1])
+    for loss in (own.semantic, own.reconstruction):
+        assert loss(predicted[:1], true[:1], high[None]).item() > 1e-3
+        assert loss(predicted[1:], true[1:], low[None]).item() == 0.0
+    assert own.semantic(predicted[:1], true[:1], high[None]).item() == pytest.approx(0.09 / 6)
+    predicted[:, 0] += 0.3
+    assert own.semantic(predicted[1:], true[1:], low[None]).item() == pytest.approx(0.09 / 5)
+    slab = kinds.variants[1]
+    shift = slab.jacobian @ np.array([0.3, 0.0, 0.0])
+    assert own.reconstruction(predicted[1:], true[1:], low[None]).item() == pytest.approx(
+        np.square(shift).sum(axis=1).mean(), rel=1e-4
+    )
+
+
+def test_variants_are_told_apart_by_cross_entropy(kinds: AffineTemplate) -> None:
+    own = Losses(kinds, torch.ones(8))
+    labels = torch.tensor([[1.0, 0.1, 0.8], [1.0, 0.1, 0.8]])
+    batch = Batch(torch.zeros(2, 1, 3), labels, torch.zeros(2, 3), torch.tensor([0, 1]))
+    odds = torch.tensor([[2.0, 0.0], [2.0, 0.0]])
+    predicted = torch.cat([batch.labels, odds], dim=1)
+    value = own.synthetic(predicted, batch, None)["variant"].item()
+    right, wrong = np.log1p(np.exp(-2.0)), np.log1p(np.exp(2.0))
+    assert value == pytest.approx((right + wrong) / 2, rel=1e-5)
+
+
+def test_a_real_shape_is_compared_with_the_variant_that_is_likely_and_fits(
+    kinds: AffineTemplate,
+) -> None:
+    own = Losses(kinds, torch.ones(8))
+    label = torch.tensor([[1.0, 0.1, 0.8, 0.0, 0.0, 0.0]])
+    samples, has = own._sample(own.decode(label), 4000)
+    slab = samples[0][has[0, 1]][None]
+    slab = slab[:, torch.randperm(slab.shape[1], generator=torch.Generator().manual_seed(1))]
+
+    def value(odds: list[float]) -> float:
+        torch.manual_seed(8)
+        return own.similarity(torch.cat([label, torch.tensor([odds])], dim=1), slab).item()
+
+    # A slab alone is no slab on a post, unless that were quite certain.
+    assert value([0.0, 0.0]) == value([-5.0, 5.0]) < 0.01
+    assert value([50.0, -50.0]) > 10 * value([0.0, 0.0])

@@ -37,6 +37,11 @@ def off_surface(template: AffineTemplate, batch: Batch) -> np.ndarray:
     return np.stack(rows)
 
 
+def only(count: int) -> torch.Tensor:
+    """The only variant, for so many shapes."""
+    return torch.zeros(count, dtype=torch.int64)
+
+
 def plain_chairs(chair: AffineTemplate, count: int) -> torch.Tensor:
     row = [PLAIN[name] for name in chair.names]
     return torch.tensor([row] * count, dtype=torch.float32)
@@ -127,14 +132,14 @@ def test_clean_clouds_lie_on_the_shapes_that_their_labels_say(chair: AffineTempl
 
 def test_labels_are_the_drawn_lengths_times_one_scale(chair: AffineTemplate) -> None:
     f = plain_chairs(chair, 2)
-    batch = SyntheticShapes(chair, CLEAN, seed=4).sample(f, 300)
+    batch = SyntheticShapes(chair, CLEAN, seed=4).sample(f, only(len(f)), 300)
     ratio = batch.parameters / f
     np.testing.assert_allclose(ratio, ratio[:, :1].expand(-1, 8), rtol=1e-5)
 
 
 def test_clean_clouds_share_their_points_by_area(stand: AffineTemplate) -> None:
     f = torch.tensor([[1.0, 0.1, 0.8]])
-    batch = SyntheticShapes(stand, CLEAN, seed=5).sample(f, 20_000)
+    batch = SyntheticShapes(stand, CLEAN, seed=5).sample(f, only(len(f)), 20_000)
     bottom = -0.05 * batch.parameters[0, 0]
     below = (batch.points[0] - batch.translation[0])[:, 1] < bottom - 1e-4
     slab, post = 2 * 1 + 4 * 0.1, 4 * 0.25 * 0.8
@@ -144,7 +149,7 @@ def test_clean_clouds_share_their_points_by_area(stand: AffineTemplate) -> None:
 def on_hidden_bottom(stand: AffineTemplate, settings: Augmentation) -> np.ndarray:
     """For each of 40 stands, whether the hidden bottom of its post has points."""
     f = torch.tensor([[1.5, 0.1, 0.3]] * 40)
-    batch = SyntheticShapes(stand, settings, seed=6).sample(f, 800)
+    batch = SyntheticShapes(stand, settings, seed=6).sample(f, only(len(f)), 800)
     floor = batch.translation[:, 1] - batch.parameters[:, 1] / 2 - batch.parameters[:, 2]
     return (batch.points[:, :, 1] <= floor[:, None] + 1e-5).any(dim=1).numpy()
 
@@ -158,7 +163,7 @@ def test_hidden_faces_are_sampled_as_often_as_asked(stand: AffineTemplate) -> No
 def post_share(stand: AffineTemplate, settings: Augmentation) -> np.ndarray:
     """``[60]`` share of the points of like stands that lie on the post."""
     f = torch.tensor([[1.0, 0.1, 0.8]] * 60)
-    batch = SyntheticShapes(stand, settings, seed=7).sample(f, 400)
+    batch = SyntheticShapes(stand, settings, seed=7).sample(f, only(len(f)), 400)
     bottom = batch.translation[:, 1] - batch.parameters[:, 1] / 2
     return (batch.points[:, :, 1] < bottom[:, None] - 1e-4).double().mean(dim=1).numpy()
 
@@ -179,11 +184,20 @@ def test_parts_are_sampled_unevenly(stand: AffineTemplate) -> None:
     assert odds.std() == pytest.approx(0.8 * np.sqrt(2), rel=0.35)
 
 
+def test_variants_are_drawn_alike_often_and_lack_what_they_lack(kinds: AffineTemplate) -> None:
+    shapes = SyntheticShapes(kinds, CLEAN, seed=7)
+    batch = shapes.batch(200, 60)
+    assert 70 <= int(batch.variant.sum()) <= 130
+    below = (batch.points - batch.translation[:, None])[..., 1] < -0.6 * batch.parameters[:, 1:2]
+    assert torch.equal(below.any(dim=1), batch.variant == 0)
+    assert torch.equal(SyntheticShapes(kinds, CLEAN, seed=7).batch(200, 60).variant, batch.variant)
+
+
 def test_noise_stays_below_its_level(chair: AffineTemplate) -> None:
     batch = SyntheticShapes(chair, replace(CLEAN, noise=0.02), seed=8).sample(
-        plain_chairs(chair, 30), 600
+        plain_chairs(chair, 30), only(30), 600
     )
-    clean = SyntheticShapes(chair, CLEAN, seed=8).sample(plain_chairs(chair, 30), 600)
+    clean = SyntheticShapes(chair, CLEAN, seed=8).sample(plain_chairs(chair, 30), only(30), 600)
     gap = np.sqrt(np.square(off_surface(chair, batch)).mean(axis=1))
     assert off_surface(chair, clean).max() < 2e-6
     # One direction of three leads off a surface; 0.6 is the radius.
@@ -194,7 +208,7 @@ def test_noise_stays_below_its_level(chair: AffineTemplate) -> None:
 
 def test_clutter_moves_some_points_off_some_shapes(chair: AffineTemplate) -> None:
     settings = replace(CLEAN, clutter=0.5)
-    batch = SyntheticShapes(chair, settings, seed=9).sample(plain_chairs(chair, 60), 500)
+    batch = SyntheticShapes(chair, settings, seed=9).sample(plain_chairs(chair, 60), only(60), 500)
     off = (off_surface(chair, batch) > 1e-4).mean(axis=1)
     assert 15 <= (off == 0).sum() <= 45
     assert 0.3 < off.max() < 0.57
@@ -207,7 +221,7 @@ def test_clutter_moves_some_points_off_some_shapes(chair: AffineTemplate) -> Non
 
 def test_clutter_is_as_symmetric_as_the_shapes(chair: AffineTemplate) -> None:
     settings = replace(CLEAN, clutter=1.0)
-    batch = SyntheticShapes(chair, settings, seed=10).sample(plain_chairs(chair, 40), 2000)
+    batch = SyntheticShapes(chair, settings, seed=10).sample(plain_chairs(chair, 40), only(40), 2000)
     where = (batch.points - batch.translation[:, None]).double().numpy()
     for points, off in zip(where, off_surface(chair, batch) > 0.02, strict=True):
         left = (points[off, 0] > 0.02).sum()
