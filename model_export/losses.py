@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
-
 from torch.nn import functional
 
 from model_export.sampling import face_areas, sample_faces
@@ -129,7 +128,9 @@ class Losses:
             least, to_cloud = distance.min(dim=2)
             share = has.float() / has.sum(dim=2, keepdim=True).clamp_min(1)
             there = torch.einsum("bks,bs->bk", share, least)
-            back, to_template = zip(*(_nearest(distance, own) for own in has.unbind(1)), strict=True)
+            back, to_template = zip(
+                *(_nearest(distance, own) for own in has.unbind(1)), strict=True
+            )
             cost = there + torch.stack([b.mean(dim=1) for b in back], dim=1)
             likely = torch.log_softmax(self._odds(predicted), dim=1) if len(back) > 1 else 0.0
             # A distance to the fourth power is its square's to the second.

@@ -12,7 +12,7 @@ PLAIN = np.array([0.42, 0.04, 0.06, 0.45, 0.48, 0.40, 0.05, 0.05])
 
 @pytest.fixture(scope="module")
 def chair() -> AffineTemplate:
-    return load_template("chair")
+    return load_template("paper_chair")
 
 
 @pytest.mark.parametrize("scale", [0.3, 1.0, 2.5])

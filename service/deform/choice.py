@@ -69,7 +69,7 @@ def choose(cases: Cases, groups: list[Group], boxes: Boxes, hubs: Mask) -> Array
     chosen = np.where(np.any(spans, axis=1)[:, None], spans, chosen)
     chosen = np.where(np.any(makes, axis=1)[:, None], makes, chosen)
     # A post that runs on from a leg into the back makes up the leg, and still belongs to both.
-    beyond = np.array([BEYOND[m[0] in boxes.lofts] for m in members], np.float32)
+    beyond = np.array([BEYOND[int(boxes.rounded[m[0]])] for m in members], np.float32)
     alone = np.where(makes, cases.cost, np.inf)
     best = alone.argmin(axis=1)[:, None]
     alone = np.take_along_axis(alone, best, axis=1)

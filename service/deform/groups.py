@@ -26,17 +26,26 @@ class Group:
 
 
 def mirror_groups(template: AffineTemplate) -> list[Group]:
-    """The parts sorted into groups, each in the order of the template; most have one member."""
-    frames = np.concatenate([template.frame_base[..., None], template.frame_jacobian], axis=-1)
+    """The parts sorted into groups, each in the order of the template; most have one member.
+
+    Only what users change counts: rear legs that lean more than those in front are legs like them.
+    """
+    frames = offered_rows(template)
     groups: list[list[int]] = []
     for part, frame in enumerate(frames):
         for group in groups:
-            if any(np.array_equal(s * frames[group[0]], frame) for s in _signs()):
+            if any(_alike(s * frames[group[0]], frame) for s in _signs()):
                 group.append(part)
                 break
         else:
             groups.append([part])
     return [Group(tuple(g), _partners(frames[g])) for g in groups]
+
+
+def offered_rows(template: AffineTemplate) -> NDArray[np.float64]:
+    """``[P, 3, 4, 1 + p]`` affine rows of the frames in the parameters that users change."""
+    rows = [template.frame_base[..., None], template.frame_jacobian[..., template.public]]
+    return np.concatenate(rows, axis=-1)
 
 
 def hub_parts(template: AffineTemplate) -> NDArray[np.bool_]:
@@ -51,13 +60,21 @@ def _signs() -> list[NDArray[np.float64]]:
     return [np.reshape(sign, (3, 1, 1)) for sign in product((1.0, -1.0), repeat=3)]
 
 
+def _alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether two frames ``[3, 4, 1 + p]`` put a box in the same place, whichever way its axes
+    point."""
+    sides = zip(one[:, :3].swapaxes(0, 1), other[:, :3].swapaxes(0, 1), strict=True)
+    same = all(np.array_equal(a, b) or np.array_equal(a, -b) for a, b in sides)
+    return same and np.array_equal(one[:, 3], other[:, 3])
+
+
 def _partners(frames: NDArray[np.float64]) -> dict[int, tuple[int, ...]]:
     partners: dict[int, tuple[int, ...]] = {}
     for axis in range(3):
         sign = np.ones((3, 1, 1))
         sign[axis] = -1.0
         images = [
-            next((j for j, f in enumerate(frames) if np.array_equal(sign * frame, f)), -1)
+            next((j for j, f in enumerate(frames) if _alike(sign * frame, f)), -1)
             for frame in frames
         ]
         if len(frames) > 1 and all(j >= 0 and j != i for i, j in enumerate(images)):

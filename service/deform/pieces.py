@@ -88,7 +88,7 @@ def vote(
     skin = _skin(cost, groups, boxes)
     rods = _elongated((high - low) * boxes.sizes.astype(np.float32))
     # Nothing holds the tip of a propeller's blade, off the wing, as a spindle's ends are held.
-    rods &= (_by_part(cost, groups) < 2 * TOUCH)[:, :, None] | ~boxes.lofted[:, None]
+    rods &= (_by_part(cost, groups) < 2 * TOUCH)[:, :, None] | ~boxes.rounded[:, None]
     member = _by_part(shares, groups) == 1.0
     low, high = _assemble(low, high, member[:, :, None] & ~rods, touching, thin)
     keep = np.where(rods, _stretch(high - low, *ROD), _stretch(high - low, CARRIED, STRETCHED))
@@ -111,7 +111,7 @@ def _anchor(low: Array32, high: Array32) -> Array32:
 def _skin(cost: Array32, groups: list[Group], boxes: Boxes) -> Mask:
     """``[pieces, P]`` pieces of a round or tapered part's skin, such as a flap: they stretch with
     it, lest they tear off the rest."""
-    return np.asarray((_by_part(cost, groups) < TOUCH) & boxes.lofted)
+    return np.asarray((_by_part(cost, groups) < TOUCH) & boxes.rounded)
 
 
 def _by_part(values: Array32, groups: list[Group]) -> Array32:

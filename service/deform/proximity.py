@@ -55,9 +55,9 @@ class Boxes:
     def long(self) -> NDArray[np.bool_]:
         """``[P, 3]`` the axes that what makes up a part runs along."""
         long: NDArray[np.bool_] = ~self.thin
-        for part, loft in self.lofts.items():
+        for part in np.flatnonzero(self.rounded).tolist():
             # A fuselage runs along a fin's chord without being a fin.
-            long[part] = np.arange(3) == loft.run
+            long[part] = np.arange(3) == self.lofts[part].run
         return long
 
     def local(self, x: Array) -> Array32:
@@ -81,16 +81,17 @@ class Boxes:
     def runs_along(self, part: int, axis: int) -> bool:
         """Whether a part lies along an axis of space, as a wing does: its image across that axis
         is beyond its own end."""
-        return part in self.lofts and self.lofts[part].run == axis
+        return bool(self.rounded[part]) and self.lofts[part].run == axis
 
     @property
-    def lofted(self) -> NDArray[np.bool_]:
-        """``[P]`` which are in `lofts`."""
-        return np.isin(np.arange(len(self.frames)), list(self.lofts))
+    def rounded(self) -> NDArray[np.bool_]:
+        """``[P]`` which are no boxes, tapering or not."""
+        round_ = [part for part, loft in self.lofts.items() if loft.outline is not None]
+        return np.isin(np.arange(len(self.frames)), round_)
 
-    def tapered(self, part: int) -> bool:
-        """Whether a part tapers."""
-        return part in self.lofts and self.lofts[part].tapered
+    def swept(self, part: int) -> bool:
+        """Whether a part is round and tapers, such as a wing: it leans as the fit has it."""
+        return bool(self.rounded[part]) and self.lofts[part].tapered
 
     def end_to_end(self, group: Group) -> bool:
         """Whether a group's members do, such as wings: they meet in the middle."""

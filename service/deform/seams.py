@@ -9,10 +9,12 @@ rest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from service.deform.groups import offered_rows
 from service.deform.proximity import Boxes
 from service.deform.spinefit import Spine
 from service.template.affine import AffineTemplate
@@ -46,29 +48,28 @@ class Seams:
 def flush_seams(template: AffineTemplate, boxes: Boxes, spines: dict[int, Spine]) -> Seams:
     """Strips of those parts that are axis-aligned boxes.
 
-    A neighbour counts where its side is the part's side for all parameters.  Where the mesh's own
-    neighbour is known to stand further in, the strip reaches to its inner face.
+    A neighbour counts whose side moves with the part's side, whatever users change.  The strip
+    reaches to its inner face, further in where the mesh's own neighbour is known to stand there.
     """
-    affine = np.concatenate([template.frame_base[..., None], template.frame_jacobian], axis=-1)
-    frames = boxes.frames
+    affine = offered_rows(template)
+    frames, rounded = boxes.frames, boxes.rounded
     low, high = np.full((len(frames), 3), -0.5), np.full((len(frames), 3), 0.5)
     for part, axis in np.ndindex(len(frames), 3):
         row = affine[part, axis]
         # Only axes that the part's frame doesn't turn.
-        if part in boxes.lofts or not row[axis].any() or np.delete(row[:3], axis, 0).any():
+        if rounded[part] or not row[axis].any() or np.delete(row[:3], axis, 0).any():
             continue
-        size = float(np.abs(frames[part, axis, axis]))
-        for other in range(len(frames)):
-            for side in (-1.0, 1.0):
-                if other == part or other in boxes.lofts:
-                    continue
-                if not _flush(row, affine[other, axis], axis, side):
-                    continue
-                width = _reach(frames[other], axis, side, spines.get(other)) / max(size, 1e-9)
-                if width <= WIDEST and side < 0:
-                    low[part, axis] = max(low[part, axis], width - 0.5)
-                if width <= WIDEST and side > 0:
-                    high[part, axis] = min(high[part, axis], 0.5 - width)
+        for other, side in product(np.flatnonzero(~rounded).tolist(), (-1.0, 1.0)):
+            if other == part or not _flush(row, affine[other, axis], axis, side):
+                continue
+            run, spine = int(template.run[other]), spines.get(other)
+            inner = _inner_face(frames[other], axis, side, run, spine)
+            edge = float(boxes.local(inner[None])[0, part, axis])
+            # A mirrored part's own axis points the other way.
+            if side * frames[part, axis, axis] < 0 and edge + 0.5 <= WIDEST:
+                low[part, axis] = max(low[part, axis], edge)
+            elif side * frames[part, axis, axis] > 0 and 0.5 - edge <= WIDEST:
+                high[part, axis] = min(high[part, axis], edge)
     return Seams(low.astype(np.float32), high.astype(np.float32))
 
 
@@ -79,13 +80,15 @@ def _flush(row: Array, beside: Array, axis: int, side: float) -> bool:
     )
 
 
-def _reach(frame: Array, axis: int, side: float, spine: Spine | None) -> float:
-    """How far from its flush side a neighbour reaches inward."""
-    width = abs(frame[axis, axis])
-    if spine is None or axis not in spine.thin:
-        return float(width)
+def _inner_face(frame: Array, axis: int, side: float, run: int, spine: Spine | None) -> Array:
+    """``[3]`` a point of a neighbour's inner face, where it is attached, as the mesh has it."""
     # The end nearest the origin is where it is attached.
-    end = 0 if frame[spine.run, 3] * frame[spine.run, spine.run] > 0 else -1
-    middle = spine.middle[end, :, spine.thin.index(axis)].mean()
-    inward = -side * middle * frame[axis, axis]
-    return float(width + max(inward, 0.0))
+    end = -0.5 if frame[run, 3] * frame[run, run] > 0 else 0.5
+    point = frame[:, 3] + end * frame[:, run]
+    inward = 0.5 * abs(frame[axis, axis])
+    if spine is not None and axis in spine.thin:
+        at = 0 if frame[spine.run, 3] * frame[spine.run, spine.run] > 0 else -1
+        middle = spine.middle[at, :, spine.thin.index(axis)].mean()
+        inward += max(-side * middle * frame[axis, axis], 0.0)
+    point[axis] -= side * inward
+    return point

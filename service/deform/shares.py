@@ -64,12 +64,13 @@ def group_shares(u: Array32, boxes: Boxes, group: Group, blocks: Blocks) -> Arra
     members = list(group.members)
     shares = np.ones((len(u), len(members)), np.float32)
     for axis, partners in group.partners.items():
-        apart = 2.0 * float(np.abs(boxes.frames[members[0], axis, 3]))
+        centers = boxes.frames[members, axis, 3]
+        apart = float(np.abs(centers[0] - centers[partners[0]]))
         half = 0.5 * np.abs(boxes.frames[members, axis, :3]).sum(axis=1)
         if not boxes.runs_along(members[0], axis):
             half = np.minimum(half, OWN * apart)
         row = boxes.frames[members, axis, :3].astype(np.float32)
-        inward = -np.sign(boxes.frames[members, axis, 3])
+        inward = np.sign(centers[list(partners)] - centers)
         offset = np.einsum("vmk,mk->vm", u[:, members], row) * inward.astype(np.float32)
         past = np.maximum(offset - half.astype(np.float32), 0.0)
         opposite = past[:, list(partners)]

@@ -2,7 +2,7 @@
 
 A template's parts are straight.  Measured from plane sections of the mesh, the middle of the real
 part, as a function of the part's long axes, straightens the unit coordinates: a splayed leg then
-thickens about its own axis.  Parts that taper lean with the fit already, and are left as they are.
+thickens about its own axis.  Wings lean with the fit already, and are left as they are.
 """
 
 from __future__ import annotations
@@ -37,17 +37,19 @@ def straighten(
     spines: dict[int, Spine] = {}
     for group in groups:
         for part in group.members:
-            if fixed[part] or boxes.tapered(part):
+            if fixed[part] or boxes.swept(part):
                 continue
             mirrored = np.full(3, np.nan)
-            for axis in group.partners:
+            for axis, partners in group.partners.items():
                 if boxes.runs_along(part, axis):
                     continue
                 row = np.abs(boxes.frames[part, axis, :3])
                 along = int(row.argmax())
                 size = np.copysign(boxes.sizes[part, along], boxes.frames[part, axis, along])
-                mirrored[along] = -boxes.frames[part, axis, 3] / size
-            run = boxes.lofts[part].run if part in boxes.lofts else 1
+                partner = group.members[partners[group.members.index(part)]]
+                apart = boxes.frames[partner, axis, 3] - boxes.frames[part, axis, 3]
+                mirrored[along] = 0.5 * apart / size
+            run = boxes.lofts[part].run if boxes.rounded[part] else 1
             spine = measure_spine(u[:, part], faces, boxes.sizes[part], mirrored, run)
             if spine is not None:
                 u[:, part, list(spine.thin)] -= spine.shift(u[:, part])

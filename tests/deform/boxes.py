@@ -15,7 +15,7 @@ ORIGIN = np.array([0.01, -0.05, 0.02])
 
 
 def chair() -> AffineTemplate:
-    return load_template("chair")
+    return load_template("paper_chair")
 
 
 def change(name: str, by: float) -> NDArray[np.float64]:

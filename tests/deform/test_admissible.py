@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from service.deform.admissible import Bounds, unusual
 from service.template.loader import load_template
 
-CHAIR = load_template("chair")
+CHAIR = load_template("paper_chair")
 F = np.array([0.40, 0.04, 0.06, 0.45, 0.48, 0.36, 0.05, 0.05])
 INDEX = {name: index for index, name in enumerate(CHAIR.names)}
 BOUNDS = Bounds.of(CHAIR, F, 1e-3)

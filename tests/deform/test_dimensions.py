@@ -12,7 +12,7 @@ from service.edits import Change, Kind
 from service.errors import InvalidRequest
 from service.template.loader import load_template
 
-CHAIR = load_template("chair")
+CHAIR = load_template("paper_chair")
 VALUES = {
     "back_height": 0.40,
     "back_thickness": 0.04,

@@ -49,7 +49,7 @@ def chair(format: str) -> bytes:
     """The chair template in the middle of its ranges: a file that the service answers."""
     if format == ZIP:
         return zipped({"chair.obj": chair("obj")})
-    template = load_template("chair")
+    template = load_template("paper_chair")
     vertices = template.decode((template.low + template.high) / 2)
     return convert(vertices - [0.0, vertices[:, 1].min(), 0.0], template.faces, format)
 

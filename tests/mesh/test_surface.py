@@ -29,7 +29,7 @@ def draw(count: int, seed: int = 0, density: np.ndarray | None = None) -> Sample
 
 @pytest.fixture(scope="module")
 def chair() -> AffineTemplate:
-    return load_template("chair")
+    return load_template("paper_chair")
 
 
 def test_points_are_the_barycentric_means_of_their_faces() -> None:

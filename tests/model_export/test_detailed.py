@@ -11,7 +11,7 @@ SEEDS = [0, 1, 2, 4, 5, 9]
 
 
 def test_the_parameters_are_the_templates():
-    assert load_template("chair").names == NAMES
+    assert load_template("paper_chair").names == NAMES
 
 
 @pytest.mark.parametrize("seed", SEEDS)

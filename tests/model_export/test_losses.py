@@ -52,7 +52,9 @@ def test_the_semantic_loss_is_the_mean_square_in_deviations(
         for i in range(4)
         for j in range(11)
     ]
-    assert losses.semantic(predicted, labels, ONLY).item() == pytest.approx(np.mean(squares), rel=1e-5)
+    assert losses.semantic(predicted, labels, ONLY).item() == pytest.approx(
+        np.mean(squares), rel=1e-5
+    )
     assert losses.semantic(labels, labels, ONLY).item() == 0.0
 
 
@@ -75,7 +77,9 @@ def test_a_shared_addition_changes_neither_loss(
     added = torch.linspace(-0.2, 0.4, 11)
     for loss in (losses.semantic, losses.reconstruction):
         plain = loss(predicted, labels, ONLY).item()
-        assert loss(predicted + added, labels + added, ONLY).item() == pytest.approx(plain, rel=1e-3)
+        assert loss(predicted + added, labels + added, ONLY).item() == pytest.approx(
+            plain, rel=1e-3
+        )
         doubled = loss(predicted * 2, labels * 2, ONLY).item()
         assert doubled == pytest.approx(4 * plain, rel=1e-4)
 

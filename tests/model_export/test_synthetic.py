@@ -221,7 +221,9 @@ def test_clutter_moves_some_points_off_some_shapes(chair: AffineTemplate) -> Non
 
 def test_clutter_is_as_symmetric_as_the_shapes(chair: AffineTemplate) -> None:
     settings = replace(CLEAN, clutter=1.0)
-    batch = SyntheticShapes(chair, settings, seed=10).sample(plain_chairs(chair, 40), only(40), 2000)
+    batch = SyntheticShapes(chair, settings, seed=10).sample(
+        plain_chairs(chair, 40), only(40), 2000
+    )
     where = (batch.points - batch.translation[:, None]).double().numpy()
     for points, off in zip(where, off_surface(chair, batch) > 0.02, strict=True):
         left = (points[off, 0] > 0.02).sum()

@@ -21,7 +21,7 @@ LEGS = ("front_right_leg", "front_left_leg", "rear_right_leg", "rear_left_leg")
 
 @pytest.fixture(scope="module")
 def chair() -> AffineTemplate:
-    return load_template("chair")
+    return load_template("paper_chair")
 
 
 @pytest.fixture(scope="module")
@@ -226,3 +226,15 @@ def test_broken_relations_are_told_as_the_file_writes_them(
     legs, back = chair.broken_relations(f * [1, 12, 1, 1, 1, 1, 5, 1])
     assert "seat_depth - 2 * leg_depth" in legs
     assert "seat_depth - back_thickness" in back
+
+
+def test_parameters_are_given_by_name(chair: AffineTemplate) -> None:
+    values = dict(zip(NAMES, np.arange(8.0), strict=True))
+    np.testing.assert_array_equal(chair.vector(values), np.arange(8.0))
+    with pytest.raises(KeyError):
+        chair.vector({"seat_width": 1.0})
+    plane = load_template("airplane")
+    public = {p.name: 1.0 for p in plane.parameters if not p.nuisance}
+    f = dict(zip(plane.names, plane.vector({**public, "wing_sweep": 0.2}), strict=True))
+    assert (f["wing_length"], f["wing_sweep"], f["wing_height"]) == (1.0, 0.2, 0.0)
+    assert f["wing_root_chord"] == pytest.approx(0.05), "no chord is nothing"

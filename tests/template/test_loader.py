@@ -223,3 +223,32 @@ def test_a_file_that_is_no_template_is_refused(tmp_path: Path, text: str) -> Non
     path.write_text(text, "utf-8")
     with pytest.raises(TemplateError, match=r"odd\.yaml|an entry has the wrong form"):
         load_template(path)
+
+
+def test_variants_lack_parts_and_their_mirrored_copies() -> None:
+    spec = {**SPEC, "variants": {"table": {}, "slab": {"without": ["leg"]}}}
+    whole = compile_template(spec)
+    table, slab = whole.variants
+    assert (table.variant, slab.variant, whole.variant) == ("table", "slab", "")
+    assert (table.parts, slab.parts) == (whole.parts, ("top",))
+    np.testing.assert_array_equal(table.decode([1.2, 0.7]), whole.decode([1.2, 0.7]))
+    np.testing.assert_array_equal(
+        slab.decode([1.2, 0.7]), whole.decode([1.2, 0.7])[whole.part == 0]
+    )
+    assert slab.faces.max() == len(slab.base) - 1
+    assert slab.active.tolist() == [True, False]
+    assert slab.variants == (slab,)
+    assert compile_template(SPEC).present == {}
+
+
+@pytest.mark.parametrize(
+    ("without", "message"),
+    [
+        (["legs"], "no part is named 'legs'"),
+        (["left_leg"], "no part"),
+        (["top", "leg"], "no parts"),
+    ],
+)
+def test_variants_that_make_no_sense_are_refused(without: list[str], message: str) -> None:
+    with pytest.raises(TemplateError, match=message):
+        compile_template({**SPEC, "variants": {"odd": {"without": without}}})
