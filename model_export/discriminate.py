@@ -27,9 +27,9 @@ from model_export.calibrate import calibrate
 from model_export.config import SHIPPED
 from model_export.distractors import heaps, other_shapes
 from model_export.disturb import disturb
-from model_export.evaluate import clouds_of, synthetic_samples
 from model_export.networks import Discriminator, fold_batch_norm
 from model_export.realistic import RealisticShape, find_shapes, normalise
+from model_export.samples import clouds_of, synthetic_samples
 from model_export.synthetic import Augmentation, SyntheticShapes
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
 from service.encode.model import Model, file_digest, template_source

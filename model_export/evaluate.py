@@ -14,38 +14,12 @@ from tqdm import tqdm
 
 from model_export.config import SHIPPED
 from model_export.metrics import Recovery, recovery
-from model_export.realistic import CLOUD_SIZE, RealisticShape, find_shapes, load_cloud
-from model_export.synthetic import Augmentation, SyntheticShapes
-from service.encode.estimate import Estimate, estimate
+from model_export.realistic import RealisticShape, find_shapes
+from model_export.samples import infer_shape, synthetic_samples
+from model_export.truth import errors_table, judge, kinds_table, read_truth, save_worst
+from service.encode.estimate import estimate
 from service.encode.model import Model, load_models
-from service.mesh.formats import read_mesh
-from service.mesh.surface import Normalization, Samples, sample_surface
-
-TEST_SEED = 10_000_019
-
-
-def clouds_of(shapes: Sequence[RealisticShape], cache: Path, points: int) -> list[np.ndarray]:
-    """Normalised clouds ``[points, 3]`` of real shapes."""
-    # Samples come in the order of the faces: spread the choice over all of them.
-    chosen = np.linspace(0, CLOUD_SIZE - 1, points).round().astype(int)
-    clouds = [load_cloud(shape, cache)[chosen] for shape in shapes]
-    return [Normalization.of(cloud).apply(cloud).astype(np.float32) for cloud in clouds]
-
-
-def synthetic_samples(model: Model, count: int) -> tuple[list[Samples], np.ndarray, np.ndarray]:
-    """Clean surface samples of fresh draws, in metres, their normalised labels and variants."""
-    shapes = SyntheticShapes(model.template, Augmentation.none(), TEST_SEED)
-    parameters, variant = shapes.draw_parameters(count), shapes.draw_variants(count).numpy()
-    samples, labels = [], []
-    for index, f in enumerate(parameters):
-        template = model.template.variants[variant[index]]
-        visible = template.faces[~template.hidden]
-        rng = np.random.default_rng([TEST_SEED, index])
-        drawn = sample_surface(template.decode(f), visible, model.points, rng)
-        normalization = Normalization.of(drawn.points)
-        samples.append(drawn)
-        labels.append([*(f * normalization.scale), *(-normalization.center * normalization.scale)])
-    return samples, np.array(labels), variant
+from service.mesh.surface import Normalization
 
 
 def synthetic_table(model: Model, count: int) -> dict[str, Any]:
@@ -81,17 +55,9 @@ def _summary(model: Model, result: Recovery) -> dict[str, Any]:
     }
 
 
-def infer_shape(model: Model, shape: RealisticShape) -> tuple[Estimate, Samples]:
-    """What the service would answer for a canonically oriented file."""
-    mesh = read_mesh(shape.path.read_bytes(), shape.path.name)
-    rng = np.random.default_rng(0)
-    samples = sample_surface(mesh.vertices, mesh.faces, model.points, rng)
-    return estimate(model, samples), samples
-
-
 def real_fits(model: Model, shapes: Sequence[RealisticShape]) -> dict[str, Any]:
     """B2: distance of the fitted template, over the bounding box's diagonal, on real shapes."""
-    rows = [(shape, infer_shape(model, shape)[0]) for shape in tqdm(shapes, desc="real")]
+    rows = [(shape, infer_shape(model, shape).fit) for shape in tqdm(shapes, desc="real")]
     ordinary = [
         fit for shape, fit in rows
         if shape.info.get("base") == "4" and shape.info.get("kind") != "stool"
@@ -112,59 +78,6 @@ def _median(values: Sequence[float]) -> float:
     return round(float(np.median(values)), 4)
 
 
-TRUTH_NAMES = {"back_thickness": "back_depth", "seat_thickness": "seat_height"}
-
-
-def truth_errors(model: Model, folder: Path, truth: Path) -> dict[str, dict[str, np.ndarray]]:
-    """Errors against hand measurements in percent of the shape's height, by parameter.
-
-    Each is the smallest over the defensible readings of the dimension.
-    """
-    measured = {row["id"]: row for row in map(json.loads, truth.read_text("utf-8").splitlines())}
-    errors: dict[str, dict[str, list[float]]] = {"encoder": {}, "refined": {}}
-    for shape in tqdm([s for s in find_shapes(folder) if s.name in measured], desc="truth"):
-        row = measured[shape.name]
-        fit, samples = infer_shape(model, shape)
-        points = fit.normalization.apply(samples.points)
-        answers = {"encoder": model.encode(points).parameters, "refined": fit.parameters}
-        for kind, parameters in answers.items():
-            lengths = parameters / fit.normalization.scale
-            values = dict(zip(model.template.names, lengths, strict=True))
-            for name, gap in _gaps(values, row).items():
-                errors[kind].setdefault(name, []).append(gap)
-    return {k: {n: np.array(v) for n, v in table.items()} for k, table in errors.items()}
-
-
-def _gaps(values: dict[str, float], row: dict[str, Any]) -> dict[str, float]:
-    height = row["bbox"]["extents"][1]
-    other = row.get("alternatives", {}).get("template", {})
-    gaps = {}
-    for name, value in values.items():
-        key = TRUTH_NAMES.get(name, name)
-        if row["template_confidence"].get(key) == "undefined":
-            continue
-        alternatives = other.get(key, [])
-        alternatives = alternatives if isinstance(alternatives, list) else [alternatives]
-        readings = [row["template"][key], *alternatives]
-        gaps[name] = 100 * min(abs(value - reading) for reading in readings) / height
-    top = row["measured"]["seat_top_y"] - row["bbox"]["min"][1]
-    tops = row.get("alternatives", {}).get("measured", {}).get("seat_top_y", [])
-    tops = tops if isinstance(tops, list) else [tops]
-    readings = [top, *(other_top - row["bbox"]["min"][1] for other_top in tops)]
-    found = values["leg_height"] + values["seat_thickness"]
-    gaps["seat_top_height"] = 100 * min(abs(found - reading) for reading in readings) / height
-    return gaps
-
-
-def print_truth(errors: dict[str, dict[str, np.ndarray]]) -> None:
-    """Median / 75th / 90th percentile a parameter, as Markdown."""
-    print("| parameter | " + " | ".join(errors) + " |")
-    print("|---|" + "---|" * len(errors))
-    for name in next(iter(errors.values())):
-        cells = (np.percentile(table[name], [50, 75, 90]) for table in errors.values())
-        print(f"| {name} | " + " | ".join(" / ".join(f"{v:.1f}" for v in c) for c in cells) + " |")
-
-
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m model_export.evaluate", description=__doc__)
@@ -172,6 +85,7 @@ def main() -> None:
     parser.add_argument("--models", type=Path, help="models folder (default: the shipped one)")
     parser.add_argument("--realistic", type=Path, help="folder of real meshes")
     parser.add_argument("--truth", type=Path, help="hand measurements of some of them")
+    parser.add_argument("--worst", type=Path, help="PNG to draw the ten worst of these to")
     parser.add_argument("--count", type=int, default=1000, help="synthetic shapes")
     arguments = parser.parse_args()
     model = load_models(arguments.models or SHIPPED)[arguments.name]
@@ -182,7 +96,10 @@ def main() -> None:
         shapes = find_shapes(arguments.realistic)
         print(json.dumps(real_fits(model, [s for s in shapes if s.held_out]), indent=2))
         if arguments.truth:
-            print_truth(truth_errors(model, arguments.realistic, arguments.truth))
+            judged = judge(model, arguments.realistic, read_truth(arguments.truth))
+            print(errors_table(judged), kinds_table(judged), sep="\n\n")
+            if arguments.worst:
+                save_worst(model, judged, arguments.worst)
 
 
 if __name__ == "__main__":

@@ -16,11 +16,12 @@ import torch
 
 from model_export.config import SHIPPED, from_plain
 from model_export.discriminate import Data, assess, build
-from model_export.evaluate import clouds_of, real_fits, synthetic_table
+from model_export.evaluate import real_fits, synthetic_table
 from model_export.networks import PointEncoder, fold_batch_norm
 from model_export.realistic import RealisticShape, find_shapes
 from model_export.refit import refit
 from model_export.report import write_report
+from model_export.samples import clouds_of
 from model_export.train import template_copy
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
 from service.encode.model import Model, file_digest, golden_cloud

@@ -17,9 +17,9 @@ from matplotlib.axes import Axes
 
 from model_export.config import SHIPPED
 from model_export.contact_sheet import fit_panel
-from model_export.evaluate import synthetic_samples
 from model_export.pictures import BLUE, YELLOW, Panel, draw, view
 from model_export.realistic import RealisticShape, find_shapes
+from model_export.samples import synthetic_samples
 from service.encode.estimate import estimate
 from service.encode.model import Model, load_models
 

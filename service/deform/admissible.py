@@ -127,7 +127,7 @@ def unusual(template: AffineTemplate, before: Array, after: Array) -> list[str]:
     """
     if _window(template, before) is None or (window := _window(template, after)) is not None:
         return []
-    sizes = np.flatnonzero(~template.signed)
+    sizes = _sizes(template)
     unchanged = sizes[after[sizes] == before[sizes]]
     window = _window(template, before, unchanged)
     low, high = window if window is not None else (0.0, np.inf)
@@ -145,7 +145,12 @@ def _window(
 
     Of all sizes, or of those with the indices ``among``.
     """
-    sizes = np.flatnonzero(~template.signed) if among is None else among
+    sizes = _sizes(template) if among is None else among
     low = float(np.max(template.low[sizes] / f[sizes], initial=0.0))
     high = float(np.min(template.high[sizes] / f[sizes], initial=np.inf))
     return (low, high) if low <= high else None
+
+
+def _sizes(template: AffineTemplate) -> NDArray[np.intp]:
+    """Indices of the sizes that a shape has: all but offsets and what is idle in its variant."""
+    return np.flatnonzero(~template.signed & template.active)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import yaml
 
 from model_export.config import Config
 from model_export.synthetic import Augmentation
+from service.encode.model import Encoding
 from service.template.affine import AffineTemplate
 from service.template.loader import compile_template, load_template
 
@@ -105,3 +107,24 @@ def meshes(stand: AffineTemplate, tmp_path_factory: pytest.TempPathFactory) -> P
         place = folder / "more" if index == 9 else folder
         mesh.export(place / f"stand{index}.{suffix}")
     return folder
+
+
+class MeanModel:
+    """Stands for an encoder: answers the same for every stand."""
+
+    points = 300
+    answer = np.array([0.7, 0.1, 0.5])
+    place = np.array([0.0, 0.2, 0.0])
+
+    def __init__(self, template: AffineTemplate) -> None:
+        self.template = template
+
+    def encode(self, points: np.ndarray) -> Encoding:
+        assert points.shape == (self.points, 3)
+        assert np.linalg.norm(points, axis=1).max() == pytest.approx(0.6)
+        return Encoding(self.answer, self.place, np.ones(1))
+
+
+@pytest.fixture(scope="session")
+def mean_model(stand: AffineTemplate) -> Any:
+    return MeanModel(stand)
