@@ -32,6 +32,7 @@ class Config:
         precision: ``fp32``, or ``bf16`` arithmetic in the shared layers.
         shared: widths of the encoder before the pool.
         head: hidden widths after it; None is the paper's.
+        keypoints: how many the encoder attends to; None is the paper's, a maximum over features.
         editing: use the editing branch.
         weights: of the losses.
         augmentation: of synthetic clouds.
@@ -39,7 +40,7 @@ class Config:
         seed: of everything random.
     """
 
-    template: str = "chair"
+    template: str = "paper_chair"
     steps: int = 40000
     batch: int = 16
     real_share: float = 0.5
@@ -51,6 +52,7 @@ class Config:
     precision: str = "fp32"
     shared: tuple[int, ...] = (64, 128, 128, 256)
     head: tuple[int, ...] | None = None
+    keypoints: int | None = None
     editing: bool = True
     weights: Weights = field(default_factory=Weights)
     augmentation: Augmentation = field(default_factory=Augmentation)

@@ -17,7 +17,7 @@ import torch
 from model_export.config import SHIPPED, from_plain
 from model_export.discriminate import Data, assess, build
 from model_export.evaluate import real_fits, synthetic_table
-from model_export.networks import PointEncoder, fold_batch_norm
+from model_export.networks import Encoder, build_encoder, fold_batch_norm
 from model_export.realistic import RealisticShape, find_shapes
 from model_export.refit import refit
 from model_export.report import write_report
@@ -36,15 +36,16 @@ QUICK = {"refit": 2000, "count": 200, "steps": 120}
 PAPER = "Wei et al., Learning to Infer Semantic Parameters for 3D Shape Editing, 3DV 2020"
 
 
-def load_encoder(state: dict[str, Any]) -> PointEncoder:
+def load_encoder(state: dict[str, Any]) -> Encoder:
     """The encoder of a checkpoint, in evaluation mode."""
     weights, config = state["encoder"], state["config"]
-    encoder = PointEncoder(weights["mean"], weights["spread"], config["shared"], config["head"])
+    shape = (config[name] for name in ("shared", "head", "keypoints"))
+    encoder = build_encoder(weights["mean"], weights["spread"], *shape)
     encoder.load_state_dict(weights)
     return encoder.eval()
 
 
-def write_onnx(encoder: PointEncoder, points: int, path: Path) -> None:
+def write_onnx(encoder: Encoder, points: int, path: Path) -> None:
     """Write the encoder for one cloud of a fixed size: input ``points``, output ``outputs``."""
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)
     with warnings.catch_warnings():
@@ -61,7 +62,7 @@ def write_onnx(encoder: PointEncoder, points: int, path: Path) -> None:
         )
 
 
-def check_onnx(encoder: PointEncoder, path: Path, clouds: list[np.ndarray]) -> float:
+def check_onnx(encoder: Encoder, path: Path, clouds: list[np.ndarray]) -> float:
     """Largest difference between torch and onnxruntime over the clouds.
 
     Raises:

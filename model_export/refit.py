@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from model_export.config import Config
-from model_export.networks import PointEncoder
+from model_export.networks import Encoder
 from model_export.synthetic import Augmentation, SyntheticShapes
 from service.template.affine import AffineTemplate
 
@@ -22,7 +22,7 @@ RIDGE = 1e-3
 
 
 @torch.no_grad()
-def refit(encoder: PointEncoder, template: AffineTemplate, config: Config, count: int) -> None:
+def refit(encoder: Encoder, template: AffineTemplate, config: Config, count: int) -> None:
     """Fit the last layer anew, in place, to ``count`` clean and half as many augmented shapes.
 
     Args:
@@ -53,13 +53,13 @@ def refit(encoder: PointEncoder, template: AffineTemplate, config: Config, count
     last.bias[:size] = weights[-1].float()
 
 
-def _last(encoder: PointEncoder) -> nn.Linear:
+def _last(encoder: Encoder) -> nn.Linear:
     last = list(encoder.head)[-1]
     assert isinstance(last, nn.Linear)
     return last
 
 
-def _features(encoder: PointEncoder, shapes: SyntheticShapes) -> tuple[Tensor, Tensor, Tensor]:
+def _features(encoder: Encoder, shapes: SyntheticShapes) -> tuple[Tensor, Tensor, Tensor]:
     """What the last layer sees of a chunk of shapes, with a one for its bias; the labels; and which
     of them say anything, in each shape's variant."""
     batch = shapes.batch(CHUNK, shapes.template.points)

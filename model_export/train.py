@@ -20,7 +20,7 @@ from tqdm import tqdm
 from model_export.config import Config, config_of
 from model_export.losses import Losses, draw_edit, total
 from model_export.metrics import Recovery, recovery
-from model_export.networks import PointEncoder
+from model_export.networks import Encoder, build_encoder
 from model_export.realistic import RealisticShapes
 from model_export.synthetic import Augmentation, Batch, SyntheticShapes
 from service.template.affine import AffineTemplate
@@ -57,7 +57,8 @@ class Trainer:
         )
         self.realistic = realistic
         mean, spread = label_statistics(self.template, config)
-        self.encoder = PointEncoder(mean, spread, config.shared, config.head).to(self.device)
+        shape = config.shared, config.head, config.keypoints
+        self.encoder = build_encoder(mean, spread, *shape).to(self.device)
         self.forward = torch.compile(self.encoder, dynamic=True) if compiled else self.encoder
         self.losses = Losses(self.template, spread.to(self.device), self.device)
         self.optimizer = torch.optim.Adam(self.encoder.parameters(), config.learning_rate)
@@ -184,7 +185,7 @@ def label_statistics(template: AffineTemplate, config: Config) -> tuple[torch.Te
 
 
 @torch.no_grad()
-def predict(encoder: PointEncoder, points: torch.Tensor) -> np.ndarray:
+def predict(encoder: Encoder, points: torch.Tensor) -> np.ndarray:
     """``[n, d + 3 + K]`` outputs in evaluation mode."""
     encoder.eval()
     chunks = [encoder(chunk) for chunk in points.split(25)]
@@ -202,7 +203,7 @@ def _columns(batch: Batch) -> tuple[torch.Tensor, ...]:
     return batch.points, batch.parameters, batch.translation, batch.variant
 
 
-def validate(encoder: PointEncoder, template: AffineTemplate, batch: Batch) -> Recovery:
+def validate(encoder: Encoder, template: AffineTemplate, batch: Batch) -> Recovery:
     """B1 of the encoder alone."""
     device = encoder.mean.device
     predicted = predict(encoder, batch.points.to(device))

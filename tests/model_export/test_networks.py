@@ -4,17 +4,17 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from model_export.networks import Discriminator, PointEncoder, fold_batch_norm
+from model_export.networks import Discriminator, PointNet, fold_batch_norm
 
 OUTPUTS = 11
 
 
-def encoder(head: tuple[int, ...] | None = None) -> PointEncoder:
+def encoder(head: tuple[int, ...] | None = None) -> PointNet:
     torch.manual_seed(0)
-    return PointEncoder(torch.linspace(-1, 1, OUTPUTS), torch.linspace(0.1, 2, OUTPUTS), head=head)
+    return PointNet(torch.linspace(-1, 1, OUTPUTS), torch.linspace(0.1, 2, OUTPUTS), head=head)
 
 
-def used(head: tuple[int, ...] | None = None) -> PointEncoder:
+def used(head: tuple[int, ...] | None = None) -> PointNet:
     """An encoder whose normalisations have seen data and learned something."""
     network = encoder(head)
     for layer in network.modules():
@@ -31,7 +31,7 @@ def clouds(count: int, points: int) -> Tensor:
     return torch.rand(count, 1, 3) * torch.randn(count, points, 3)
 
 
-def widths(network: PointEncoder) -> list[tuple[int, int]]:
+def widths(network: PointNet) -> list[tuple[int, int]]:
     return [
         (layer.in_features, layer.out_features)
         for layer in network.modules()

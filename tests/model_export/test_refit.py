@@ -5,16 +5,16 @@ import copy
 import torch
 
 from model_export.config import Config
-from model_export.networks import PointEncoder
+from model_export.networks import PointNet
 from model_export.refit import refit
 from model_export.synthetic import Augmentation, SyntheticShapes
 from model_export.train import label_statistics
 from service.template.affine import AffineTemplate
 
 
-def encoder_of(stand: AffineTemplate, config: Config) -> PointEncoder:
+def encoder_of(stand: AffineTemplate, config: Config) -> PointNet:
     torch.manual_seed(0)
-    encoder = PointEncoder(*label_statistics(stand, config), head=(32, 16)).train()
+    encoder = PointNet(*label_statistics(stand, config), head=(32, 16)).train()
     shapes = SyntheticShapes(stand, Augmentation.none(), 4)
     with torch.no_grad():
         for _ in range(40):  # random layers, with the normalisation that training gives
@@ -22,7 +22,7 @@ def encoder_of(stand: AffineTemplate, config: Config) -> PointEncoder:
     return encoder.eval()
 
 
-def error(encoder: PointEncoder, stand: AffineTemplate) -> float:
+def error(encoder: PointNet, stand: AffineTemplate) -> float:
     batch = SyntheticShapes(stand, Augmentation.none(), 5).batch(100, stand.points)
     labels = torch.cat([batch.parameters, batch.translation], dim=1)
     with torch.no_grad():
