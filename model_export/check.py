@@ -59,8 +59,9 @@ def draw_sheet(template: AffineTemplate, path: Path) -> None:
     panels = [Panel(own.variant, [_mesh(own, rest, YELLOW)]) for own in others]
     panels += [panel for index in range(len(rest)) for panel in _extremes(template, rest, index)]
     rows = -(-len(panels) // (2 * PAIRS))
-    figure = pyplot.figure(figsize=(11, 3.0 + 2.0 * rows), layout="constrained")
-    above, below = figure.subfigures(2, 1, height_ratios=[3.0, 2.0 * rows])
+    top = max(3.0, 0.6 + 0.2 * len(rest))
+    figure = pyplot.figure(figsize=(11, top + 2.0 * rows), layout="constrained")
+    above, below = figure.subfigures(2, 1, height_ratios=[top, 2.0 * rows])
     picture, table = above.subplots(1, 2, width_ratios=[1, 2.2])
     draw(picture, Panel(f"{template.label} at rest", [_mesh(usual, rest, YELLOW)]), view())
     _draw_table(table, template, rest)

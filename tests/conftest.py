@@ -86,7 +86,7 @@ def service_client() -> Iterator[httpx.Client]:
 @pytest.fixture(scope="session")
 def box_chair() -> trimesh.Trimesh:
     """The template at plain values, in metres, standing on y = 0: seat top at 0.46."""
-    template = load_template("chair")
+    template = load_template("paper_chair")
     values = {
         "back_height": 0.42,
         "back_thickness": 0.04,

@@ -84,6 +84,8 @@ class Fit(Schema):
     """Symmetric mean surface distance, divided by the upload's bounding-box diagonal."""
     encoder_distance: float
     """The same before the values were refined."""
+    variant: str | None = Field(examples=["armchair"])
+    """Which kind of the category it is, where there are several."""
     in_distribution: bool
     """False: the mesh is unlike what the model was trained on; take the values with care."""
     score: float

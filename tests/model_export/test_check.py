@@ -45,6 +45,18 @@ def test_a_sound_template_is_drawn_and_written_as_a_mesh(
     assert (rest.extents < np.ptp(high, axis=0)).all()
 
 
+def test_variants_are_drawn_too(file: Path, tmp_path: Path) -> None:
+    def yellow_rows() -> int:
+        assert main([str(file), "--out", str(tmp_path / "sheet.png")]) == 0
+        picture = image.imread(tmp_path / "sheet.png")[:, :, :3]
+        return int((picture[:, :, 0] > picture[:, :, 2] + 0.2).any(axis=1).sum())
+
+    before = yellow_rows()
+    text = file.read_text("utf-8")
+    file.write_text(f"{text}\nvariants:\n  one: {{}}\n  other: {{}}\n", "utf-8")
+    assert yellow_rows() > before
+
+
 def test_errors_are_told_apart_from_warnings(
     file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -70,7 +82,11 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     assert main([str(tmp_path / "nothing.yaml")]) == 1
 
 
-def test_the_shipped_chair_is_sound() -> None:
-    template, mistakes = check(Path(service.__file__).parent / "template" / "chair.yaml")
+SHIPPED = sorted((Path(service.__file__).parent / "template").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_the_shipped_templates_are_sound(path: Path) -> None:
+    template, mistakes = check(path)
     assert template is not None
     assert [str(mistake) for mistake in mistakes if mistake.error] == []

@@ -13,10 +13,11 @@ from service.template.loader import load_template
 def test_the_defaults_are_the_papers() -> None:
     config = load_config("paper-chair")
     assert config == Config()
-    assert config.template == "chair"
+    assert config.template == "paper_chair"
     assert (config.batch, config.real_share, config.learning_rate) == (16, 0.5, 1e-3)
     assert (config.weights.alpha, config.weights.beta, config.weights.gamma) == (0.3, 30.0, 50.0)
     assert (config.shared, config.head) == ((64, 128, 128, 256), None)
+    assert config.keypoints is None
     assert config.editing
     assert not config.cosine
 
@@ -31,13 +32,10 @@ def test_the_shipped_chair_has_a_configuration() -> None:
 
 
 def test_airplanes_are_trained_with_the_papers_weights_for_them() -> None:
-    first, second = load_config("airplane"), load_config("airplane-served-size")
-    served = load_template("airplane").points
-    assert first.template == second.template == "airplane"
-    assert first.weights == second.weights == Weights(alpha=0.3, beta=200, gamma=10)
-    assert first.final_points == served
-    assert second.points == (served, served)
-    assert (first.shared, first.head) == (second.shared, second.head)
+    config = load_config("airplane")
+    assert config.template == "airplane"
+    assert config.weights == Weights(alpha=0.3, beta=200, gamma=10)
+    assert config.final_points == load_template("airplane").points
 
 
 def test_a_file_overrides_the_defaults_and_the_caller_overrides_the_file(tmp_path: Path) -> None:

@@ -76,6 +76,16 @@ def test_parts_that_come_apart(spec: Any) -> None:
     assert "% of the draws fall into pieces" in told(found(spec), "parts top, shelf").text
 
 
+def test_a_variant_without_a_part_that_a_public_parameter_moves(spec: Any) -> None:
+    spec["variants"] = {"table": {}, "slab": {"without": ["front_right_leg"]}}
+    mistakes = [m for m in found(spec) if m.entry == "variants slab"]
+    assert mistakes, "legs have a height and a thickness"
+    assert all(m.error and "has no part that leg_" in m.text for m in mistakes)
+    for parameter in ("leg_height", "leg_thickness"):
+        spec["parameters"][parameter]["nuisance"] = True
+    assert not [m for m in found(spec) if m.entry == "variants slab"]
+
+
 def test_a_part_that_touches_nothing(spec: Any) -> None:
     spec["parts"]["front_right_leg"]["center"][1] = "-top_thickness - leg_height"
     mistake = told(found(spec), "parts front_right_leg")
