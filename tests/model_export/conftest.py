@@ -119,6 +119,16 @@ class MeanModel:
     def __init__(self, template: AffineTemplate) -> None:
         self.template = template
 
+    @property
+    def discriminator(self) -> MeanModel:
+        return self
+
+    def odds(self, cloud: np.ndarray, orientations: list[Any]) -> np.ndarray:
+        return np.zeros(len(orientations))
+
+    def score(self, distance: float, odds: float) -> float:
+        return 1.0 / (1.0 + distance)
+
     def encode(self, points: np.ndarray) -> Encoding:
         assert points.shape == (self.points, 3)
         assert np.linalg.norm(points, axis=1).max() == pytest.approx(0.6)

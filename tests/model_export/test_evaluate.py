@@ -40,11 +40,15 @@ def test_ordinary_shapes_are_measured_apart(mean_model: Any, meshes: Path) -> No
     for shape, info in zip(shapes, kinds, strict=True):
         shape.info.update(info)
     table = evaluate.real_fits(mean_model, shapes)
-    assert table["four_legs_and_back"]["shapes"] == 3
+    assert list(table) == ["all", "four legs and a back", "kind stool"]
+    assert table["four legs and a back"]["shapes"] == 3
+    assert table["kind stool"]["shapes"] == 2
     assert table["all"]["shapes"] == 10
     distances = [infer_shape(mean_model, shape).fit.distance for shape in shapes]
-    median = table["four_legs_and_back"]["median_distance_refined"]
+    median = table["four legs and a back"]["median_distance_refined"]
     assert median == pytest.approx(float(np.median(distances[:3])), abs=1e-4)
+    score = table["four legs and a back"]["median_score"]
+    assert score == pytest.approx(1 / (1 + np.median(distances[:3])), abs=1e-4)
 
 
 def test_the_command_line_measures_an_installed_model(
