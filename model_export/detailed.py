@@ -33,6 +33,11 @@ NAMES = (
     "seat_width", "leg_height", "leg_depth", "leg_width",
 )  # fmt: skip
 
+ARM_HALF = (0.022, 0.014)
+"""Half an arm's width and thickness,"""
+ARM_SHORT = 0.05
+"""and how far behind the seat's front edge it ends."""
+
 
 @dataclass(frozen=True)
 class DetailedChair:
@@ -42,11 +47,15 @@ class DetailedChair:
         parameters: ``[8]`` metres, in the chair template's order.
         faces: ``[F, 3]``, the same for all parameters.
         welded: whether it is one connected piece.
+        nuisances: what the chair template needs besides to stand as this chair does.
+        arms: whether it has any.
     """
 
     parameters: Array
     faces: Faces
     welded: bool
+    nuisances: dict[str, float]
+    arms: bool
     _build: Callable[[SimpleNamespace], Mesh]
 
     def mesh(self, f: ArrayLike) -> Array:
@@ -67,7 +76,21 @@ def detailed_chair(seed: int) -> DetailedChair:
     def build(p: SimpleNamespace) -> Mesh:
         return builder(p, style)
 
-    return DetailedChair(parameters, build(_named(parameters))[1], welded, build)
+    faces = build(_named(parameters))[1]
+    arms = bool(style.arms) and not welded
+    nuisances = _nuisances(_named(parameters), style, 0.0 if welded else style.inset)
+    return DetailedChair(parameters, faces, welded, nuisances, arms, build)
+
+
+def _nuisances(p: SimpleNamespace, s: SimpleNamespace, inset: float) -> dict[str, float]:
+    sideways, lengthways = s.splay
+    return {
+        "leg_splay": sideways, "front_splay": lengthways, "rear_splay": lengthways,
+        "leg_inset": inset, "front_inset": inset, "rear_inset": inset, "back_recline": s.recline,
+        "arm_height": s.arms + ARM_HALF[1], "arm_gap": s.arm_out - ARM_HALF[0],
+        "arm_width": 2 * ARM_HALF[0], "arm_thickness": 2 * ARM_HALF[1],
+        "arm_length": p.seat_depth - ARM_SHORT,
+    }  # fmt: skip
 
 
 def _named(f: ArrayLike) -> SimpleNamespace:
@@ -219,9 +242,9 @@ def _rails(
 def _arm(p: SimpleNamespace, s: SimpleNamespace, side: int) -> Iterator[Mesh]:
     x = side * (p.seat_width / 2 + s.arm_out)
     y = p.seat_thickness / 2 + s.arms
-    front = p.seat_depth / 2 - 0.05
+    front = p.seat_depth / 2 - ARM_SHORT
     rear = (p.back_thickness - p.seat_depth) / 2 - s.recline * s.arms / 0.5
-    yield bar((x, y, rear), (x, y, front), (0.022, 0.014), s.density, True)
+    yield bar((x, y, rear), (x, y, front), ARM_HALF, s.density, True)
     yield bar((x, 0, front - 0.03), (x, y, front - 0.03), (0.013, 0.013), s.density, False)
 
 
