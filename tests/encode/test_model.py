@@ -23,6 +23,11 @@ from service.mesh.surface import Normalization
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
 
+SIX_BOXES = (
+    (Path(service.template.__file__).parent / "paper_chair.yaml")
+    .read_text("utf-8")
+    .replace("name: paper_chair", "name: chair")
+)
 ANSWER = [0.4, 0.04, 0.06, -0.2, 0.5, 0.4, 0.05, 0.0]
 
 
@@ -30,7 +35,7 @@ ANSWER = [0.4, 0.04, 0.06, -0.2, 0.5, 0.4, 0.05, 0.0]
 def folder(
     tmp_path: Path, write_network: Any, write_discriminator: Any, chair: AffineTemplate
 ) -> Path:
-    """A models folder with a chair whose network answers `ANSWER`."""
+    """A models folder with a chair of six boxes whose network answers `ANSWER`."""
     network = write_network(tmp_path / "chair.onnx", ANSWER, (1, 100, 3))
     discriminator = write_discriminator(tmp_path / "chair.discriminator.onnx")
     golden = EncoderSession(network).run(golden_cloud(chair, 100))
@@ -43,6 +48,7 @@ def folder(
         "calibration": {"limit_distance": 0.03, "limit_odds": 1.0},
     }
     (tmp_path / "chair.json").write_text(json.dumps(card), "utf-8")
+    (tmp_path / "chair.yaml").write_text(SIX_BOXES, "utf-8")
     return tmp_path
 
 
@@ -68,10 +74,25 @@ def test_an_empty_folder_holds_no_models(tmp_path: Path) -> None:
 def test_encoding_splits_the_answer_and_keeps_sizes_positive(folder: Path) -> None:
     model = load_models(folder)["chair"]
     cloud = np.random.default_rng(0).normal(size=(100, 3))
-    parameters, translation = model.encode(cloud)
+    answer = model.encode(cloud)
     expected = np.where(np.array(ANSWER) > 0, ANSWER, SMALLEST)
-    np.testing.assert_allclose(parameters, expected, rtol=1e-6)
-    np.testing.assert_allclose(translation, cloud.max(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(answer.parameters, expected, rtol=1e-6)
+    np.testing.assert_allclose(answer.translation, cloud.max(axis=0), rtol=1e-6)
+    assert answer.shares.tolist() == [1.0], "there is but one variant"
+
+
+def test_the_rest_of_the_answer_is_the_odds_of_the_variants(
+    folder: Path, write_network: Any
+) -> None:
+    write_network(folder / "chair.onnx", [*ANSWER, 0.1, 0.2, 0.3], (1, 100, 3))
+    variants = "\nvariants:\n  a: {}\n  b: {without: [back]}\n  c: {}\n"
+    (folder / "chair.yaml").write_text(SIX_BOXES + variants, "utf-8")
+    model = load_models(folder)["chair"]
+    cloud = np.random.default_rng(0).normal(size=(100, 3))
+    answer = model.encode(cloud)
+    np.testing.assert_allclose(answer.translation, [0.1, 0.2, 0.3], rtol=1e-6)
+    odds = np.exp(cloud.max(axis=0))
+    np.testing.assert_allclose(answer.shares, odds / odds.sum(), rtol=1e-5)
 
 
 def test_signed_offsets_stay_as_the_network_says(folder: Path, chair: AffineTemplate) -> None:
@@ -79,8 +100,8 @@ def test_signed_offsets_stay_as_the_network_says(folder: Path, chair: AffineTemp
     offsets = {"seat_depth": -0.3, "leg_width": 0.0}
     parameters = tuple(replace(p, low=offsets.get(p.name, p.low)) for p in chair.parameters)
     model.template = replace(chair, parameters=parameters)
-    answer, _ = model.encode(np.zeros((100, 3)))
-    np.testing.assert_allclose(answer, ANSWER, rtol=1e-6)
+    answer = model.encode(np.zeros((100, 3)))
+    np.testing.assert_allclose(answer.parameters, ANSWER, rtol=1e-6)
 
 
 def test_nuisance_parameters_are_not_described(folder: Path, chair: AffineTemplate) -> None:
@@ -92,8 +113,7 @@ def test_nuisance_parameters_are_not_described(folder: Path, chair: AffineTempla
 
 
 def test_a_template_beside_the_card_is_the_categorys(folder: Path) -> None:
-    source = Path(service.template.__file__).parent / "chair.yaml"
-    text = source.read_text("utf-8").replace("label: Chair", "label: Throne")
+    text = SIX_BOXES.replace("label: Chair of six boxes", "label: Throne")
     (folder / "chair.yaml").write_text(text, "utf-8")
     assert load_models(folder)["chair"].template.label == "Throne"
 
@@ -104,7 +124,7 @@ def test_the_golden_cloud_is_a_normalised_chair_and_always_the_same(
     cloud = golden_cloud(chair, 300)
     assert (cloud.shape, cloud.dtype) == ((300, 3), np.float32)
     np.testing.assert_allclose(Normalization.of(cloud).apply(cloud), cloud, atol=1e-6)
-    assert np.array_equal(cloud, golden_cloud(load_template("chair"), 300))
+    assert np.array_equal(cloud, golden_cloud(load_template("paper_chair"), 300))
 
 
 def test_an_altered_file_is_noticed(folder: Path, write_network: Any) -> None:
@@ -159,6 +179,7 @@ def test_a_card_that_cannot_be_used_is_refused(folder: Path, fault: str) -> None
         (folder / "chair.json").write_text("[]", "utf-8")
     elif fault == "template":
         rewrite(folder, name="sofa")
+        (folder / "chair.yaml").unlink()
     elif fault == "yaml":
         (folder / "chair.yaml").write_text("name: chair", "utf-8")
     else:
@@ -217,9 +238,12 @@ def test_the_installed_model_is_whole(chair_model: Model, chair: AffineTemplate)
     assert 0.02 < chair_model.limit_distance < 0.06
 
 
-def test_the_installed_model_tells_chairs_apart(chair_model: Model, labelled: Any) -> None:
+def test_the_installed_model_tells_chairs_apart(
+    chair_model: Model, chair: AffineTemplate, labelled: Any
+) -> None:
     template = chair_model.template
-    middle = (template.low + template.high) / 2
+    assert template.names[:8] == chair.names
+    middle = (chair.low + chair.high) / 2
     for name in ("seat_width", "leg_height", "back_height", "seat_depth"):
         index = template.names.index(name)
         shares = []
@@ -227,7 +251,7 @@ def test_the_installed_model_tells_chairs_apart(chair_model: Model, labelled: An
             f = middle.copy()
             f[index] *= factor
             cloud, _, _ = labelled(f)
-            parameters, _ = chair_model.encode(cloud.points)
+            parameters = chair_model.encode(cloud.points).parameters[:8]
             shares.append(parameters[index] / np.linalg.norm(parameters))
         assert shares[1] > 1.2 * shares[0], name
 

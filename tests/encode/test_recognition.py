@@ -8,6 +8,7 @@ from service.encode.model import Model
 from service.encode.recognition import LISTED, recognise, straightened, turned
 from service.mesh.frame import CANONICAL, Orientation, orientations
 from service.mesh.surface import Samples, sample_surface
+from service.template.affine import AffineTemplate
 
 SEVERAL = [
     Orientation("+z", "-y"),
@@ -46,7 +47,7 @@ def test_a_chair_is_recognised_whichever_way_it_lies(
     assert best.model is chair_model
     np.testing.assert_allclose(best.samples.points, chair_samples.points, atol=1e-12)
     metres = best.estimate.parameters / best.estimate.normalization.scale
-    np.testing.assert_allclose(metres, plain, atol=0.006)
+    np.testing.assert_allclose(metres[:8], plain, atol=0.006)
     assert len(found) >= LISTED
     assert len({candidate.orientation for candidate in found}) == len(found)
     assert best.probability > 0.9 > 0.1 > found[1].probability
@@ -65,9 +66,9 @@ def test_the_readings_come_with_falling_probabilities(
 
 
 def test_what_looks_the_same_from_all_sides_is_read_as_files_mostly_are(
-    chair_model: Model, plain: np.ndarray
+    chair_model: Model, chair: AffineTemplate, plain: np.ndarray
 ) -> None:
-    template = chair_model.template
+    template = chair
     stool = dict(zip(template.names, plain, strict=True))
     stool |= {"back_height": 0.02, "back_thickness": 0.02, "seat_depth": 0.48}
     vertices = template.decode(np.array(list(stool.values())))
@@ -127,7 +128,7 @@ def test_a_leaning_chair_is_straightened(
     assert (best.orientation.up, best.orientation.front) == ("+y", "+z")
     assert best.orientation.degrees == pytest.approx(np.degrees(np.linalg.norm(lean)), abs=1.5)
     metres = best.estimate.parameters / best.estimate.normalization.scale
-    np.testing.assert_allclose(metres, plain, atol=0.012)
+    np.testing.assert_allclose(metres[:8], plain, atol=0.012)
     np.testing.assert_allclose(best.samples.points, chair_samples.points, atol=0.02)
 
 
