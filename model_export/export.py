@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from model_export.calibrate import sigma_floors
 from model_export.config import SHIPPED, from_plain
 from model_export.discriminate import Data, assess, build
 from model_export.evaluate import real_fits, synthetic_table
@@ -23,6 +24,7 @@ from model_export.refit import refit
 from model_export.report import write_report
 from model_export.samples import clouds_of
 from model_export.train import template_copy
+from model_export.truth import judge, read_truth, summary
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
 from service.encode.model import Model, file_digest, golden_cloud
 from service.encode.session import EncoderSession
@@ -154,6 +156,7 @@ def main() -> None:
     parser.add_argument("name", help="name of the run and of the category")
     parser.add_argument("--run", type=Path, help="its folder (default runs/<name>)")
     parser.add_argument("--realistic", type=Path, help="real meshes, to check and to measure on")
+    parser.add_argument("--truth", type=Path, help="hand measurements, to calibrate sigma on")
     parser.add_argument("--ablation", type=Path, help="JSON of further runs' figures to record")
     parser.add_argument("--cache", type=Path, default=Path("cache"), help="for sampled clouds")
     parser.add_argument("--out", type=Path, default=SHIPPED, help="models folder")
@@ -201,6 +204,11 @@ def main() -> None:
     if shapes:
         held_out = [shape for shape in shapes if shape.held_out]
         card["metrics"]["realistic"] = real_fits(model, held_out)
+    if arguments.realistic and arguments.truth:
+        truth = read_truth(arguments.truth)
+        floors = sigma_floors(judge(model, arguments.realistic, truth))
+        card["calibration"]["sigma_floor"] = floors
+        card["metrics"]["truth"] = summary(judge(model, arguments.realistic, truth))
     if arguments.ablation:
         card["metrics"]["ablation"] = json.loads(arguments.ablation.read_text("utf-8"))
     card_path = path.with_suffix(".json")

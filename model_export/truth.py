@@ -65,6 +65,8 @@ class Judged:
         shape, measured: the shape.
         encoder, refined: percent off by dimension, of the encoder alone and with refinement.
         sigma: percent claimed for the refined values.
+        fitted_sigma: normalised, as the fit alone has it, less the model's floor.
+        unit: normalised length that a percent of the size is.
     """
 
     shape: RealisticShape
@@ -72,6 +74,8 @@ class Judged:
     encoder: Mapping[str, float]
     refined: Mapping[str, float]
     sigma: Mapping[str, float]
+    fitted_sigma: Mapping[str, float]
+    unit: float
 
     @property
     def worst(self) -> float:
@@ -123,7 +127,10 @@ def _judged(model: Model, shape: RealisticShape, measured: Measured) -> Judged:
     )
     claimed = 100 * sigma / normalization.scale / measured.size
     claims = dict(zip(model.template.names, claimed.tolist(), strict=True))
-    return Judged(shape, measured, encoder, refined, claims)
+    alone = np.sqrt(np.maximum(sigma**2 - model.sigma_floor**2, 0.0))
+    fitted = dict(zip(model.template.names, alone.tolist(), strict=True))
+    unit = 0.01 * measured.size * normalization.scale
+    return Judged(shape, measured, encoder, refined, claims, fitted, unit)
 
 
 def _dimensions(found: Inferred, f: Array) -> dict[str, float]:
@@ -145,17 +152,38 @@ def save_worst(model: Model, judged: Sequence[Judged], path: Path, count: int = 
     save_sheet(panels, path)
 
 
+def summary(judged: Sequence[Judged]) -> dict[str, Any]:
+    """The card's account: percentiles of the errors of each dimension, and sigma's coverage."""
+    table = {}
+    for name in _names(judged):
+        rows = [entry for entry in judged if name in entry.refined]
+        table[name] = {
+            "shapes": len(rows),
+            "encoder": _percentiles([entry.encoder[name] for entry in rows]),
+            "refined": _percentiles([entry.refined[name] for entry in rows]),
+        }
+        claims = [entry for entry in rows if name in entry.sigma]
+        if claims:
+            within = [entry.refined[name] <= entry.sigma[name] for entry in claims]
+            table[name]["within_sigma_percent"] = round(100 * float(np.mean(within)), 1)
+    return {"percentiles": list(PERCENTILES), "errors_percent_of_size": table}
+
+
+def _percentiles(errors: Sequence[float]) -> list[float]:
+    return [round(float(value), 2) for value in np.percentile(errors, PERCENTILES)]
+
+
 def errors_table(judged: Sequence[Judged]) -> str:
     """Median / 75th / 90th percentile of the errors of each dimension, as Markdown."""
     lines = ["| dimension | encoder | refined | within sigma |", "|---|---|---|---|"]
-    for name in _names(judged):
-        rows = [entry for entry in judged if name in entry.refined]
-        cells = [_spread([entry.encoder[name] for entry in rows]),
-                 _spread([entry.refined[name] for entry in rows])]  # fmt: skip
-        claims = [entry for entry in rows if name in entry.sigma]
-        within = [entry.refined[name] <= entry.sigma[name] for entry in claims]
-        share = f"{100 * np.mean(within):.0f} %" if within else "-"
-        lines.append(f"| {name} | {' | '.join(cells)} | {share} |")
+    for name, row in summary(judged)["errors_percent_of_size"].items():
+        cells = (
+            " / ".join(f"{value:.1f}" for value in row[kind]) for kind in ("encoder", "refined")
+        )
+        share = row.get("within_sigma_percent")
+        lines.append(
+            f"| {name} | {' | '.join(cells)} | {'-' if share is None else f'{share:.0f} %'} |"
+        )
     return "\n".join(lines)
 
 
@@ -176,7 +204,3 @@ def kinds_table(judged: Sequence[Judged]) -> str:
 
 def _names(judged: Iterable[Judged]) -> list[str]:
     return list(dict.fromkeys(name for entry in judged for name in entry.refined))
-
-
-def _spread(errors: Sequence[float]) -> str:
-    return " / ".join(f"{value:.1f}" for value in np.percentile(errors, PERCENTILES))

@@ -16,9 +16,6 @@ from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
 
-SIGMA_FLOOR = 0.004
-"""Least standard deviation claimed for a refined parameter: the repeat error of measuring real
-shapes by hand is of this size (share of the radius 0.6 frame's unit)."""
 DIVERGED = 1.5
 """A refinement that ends this much farther from the mesh than it began has lost its way."""
 PROBES = 600
@@ -93,7 +90,7 @@ def estimate(
             continue
         variant = model.template.variants[index]
         start = _encoded(variant, encoding, cloud, normalization, inside_out)
-        fit = _refined(start, cloud, settings)
+        fit = _refined(start, cloud, settings, model.sigma_floor)
         # As in recognition: how likely it seemed, and how well it fits.
         fits.append((encoding.shares[index] * fit.distance**-STEEPNESS, fit))
     return max(fits, key=lambda pair: pair[0])[1]
@@ -115,8 +112,8 @@ def _encoded(
     )
 
 
-def _refined(start: Estimate, cloud: Cloud, settings: Settings) -> Estimate:
-    """A fit from the encoder's answer on, unless it goes astray."""
+def _refined(start: Estimate, cloud: Cloud, settings: Settings, floor: Array) -> Estimate:
+    """A fit from the encoder's answer on, unless it goes astray; sigma is at least ``floor``."""
     fit = refine(start.template, start.parameters, start.translation, cloud, settings)
     distance = surface_distance(start.template, fit.parameters, fit.translation, cloud)
     if distance > DIVERGED * start.distance:
@@ -125,7 +122,7 @@ def _refined(start: Estimate, cloud: Cloud, settings: Settings) -> Estimate:
         start,
         parameters=fit.parameters,
         translation=fit.translation,
-        sigma=np.hypot(fit.sigma, SIGMA_FLOOR),
+        sigma=np.hypot(fit.sigma, floor),
         distance=distance,
     )
 

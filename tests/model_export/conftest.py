@@ -126,6 +126,10 @@ class MeanModel:
     def odds(self, cloud: np.ndarray, orientations: list[Any]) -> np.ndarray:
         return np.zeros(len(orientations))
 
+    @property
+    def sigma_floor(self) -> np.ndarray:
+        return np.full(3, 0.004)
+
     def score(self, distance: float, odds: float) -> float:
         return 1.0 / (1.0 + distance)
 

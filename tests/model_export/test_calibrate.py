@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from model_export.calibrate import DRAWN_FARTHER, DRAWN_ODDS, calibrate
-from model_export.realistic import find_shapes
+from model_export.calibrate import (
+    DRAWN_FARTHER,
+    DRAWN_ODDS,
+    FEWEST,
+    calibrate,
+    sigma_floors,
+)
+from model_export.realistic import RealisticShape, find_shapes
+from model_export.truth import Judged, Measured
 from service.encode.model import Model, load_models
 from service.mesh.frame import CANONICAL
 from service.mesh.surface import Samples, sample_surface
@@ -57,3 +64,20 @@ def test_real_shapes_come_before_drawn_ones(
     assert card["shapes"] == 2
     assert card["limit_distance"] < 0.02
     assert card["limit_odds"] > 0
+
+
+def test_sigma_covers_two_thirds_of_the_errors() -> None:
+    rng = np.random.default_rng(0)
+    shape, measured = RealisticShape("a", Path("a.ply"), False, {}), Measured("a", "all", 1.0, {})
+
+    def answer(error: float, fitted: float) -> Judged:
+        name = {"width": error}
+        return Judged(shape, measured, name, name, {"width": 1.0}, {"width": fitted}, 0.02)
+
+    errors, fitted = np.abs(rng.normal(0, 2.0, 400)), rng.uniform(0.0, 0.02, 400)
+    judged = [answer(e, f) for e, f in zip(errors, fitted, strict=True)]
+    floor = sigma_floors(judged)["width"]
+    within = errors * 0.02 <= np.hypot(fitted, floor)
+    assert within.mean() == pytest.approx(0.68, abs=0.01)
+    assert sigma_floors(judged[: FEWEST - 1]) == {}
+    assert sigma_floors([answer(0.1, 1.0)] * FEWEST) == {"width": 0.0}

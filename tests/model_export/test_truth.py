@@ -78,6 +78,7 @@ def test_answers_are_judged_encoder_and_refined(
         height = np.ptp(found.mesh.vertices[:, 1])
         for errors in (entry.encoder, entry.refined):
             assert errors["total_height"] == pytest.approx(200 * abs(height - 1.0), abs=1e-6)
+        assert entry.unit == pytest.approx(0.005 * scale)
         assert entry.worst == max(entry.refined.values())
 
 
@@ -85,7 +86,7 @@ def judged(kind: str, refined: dict[str, float], sigma: float = 1.0) -> Judged:
     shape = RealisticShape("a", Path("a.ply"), False, {})
     encoder = {name: 2 * value for name, value in refined.items()}
     claims = dict.fromkeys(refined, sigma)
-    return Judged(shape, Measured("a", kind, 1.0, {}), encoder, refined, claims)
+    return Judged(shape, Measured("a", kind, 1.0, {}), encoder, refined, claims, claims, 0.01)
 
 
 def test_the_tables_give_percentiles_and_how_often_sigma_holds() -> None:
