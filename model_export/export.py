@@ -170,6 +170,10 @@ def main() -> None:
         help="folders of meshes of other kinds, for the discriminator",
     )  # fmt: skip
     parser.add_argument("--but", help="regular expression: files there that are of the category")
+    parser.add_argument(
+        "--keep-discriminator", action="store_true",
+        help="leave the one that the models folder has, and only measure it anew",
+    )  # fmt: skip
     arguments = parser.parse_args()
     for name, size in (QUICK if arguments.quick else FULL).items():
         if getattr(arguments, name) is None:
@@ -196,8 +200,12 @@ def main() -> None:
     card["training"]["refit_shapes"] = arguments.refit
     card["data"] = describe_data(shapes)
     data = Data(shapes, arguments.others, arguments.but)
-    second = path.with_suffix(DISCRIMINATOR_SUFFIX)
-    card["discriminator"] = build(template, data, arguments.steps, second, arguments.cache)
+    if arguments.keep_discriminator:
+        installed = json.loads(path.with_suffix(".json").read_text("utf-8"))
+        card["discriminator"] = installed["discriminator"]
+    else:
+        second = path.with_suffix(DISCRIMINATOR_SUFFIX)
+        card["discriminator"] = build(template, data, arguments.steps, second, arguments.cache)
     model = Model(card, template, path, threads=1)
     assess(model, data, arguments.cache)
     card["metrics"] = {"synthetic": synthetic_table(model, arguments.count)}

@@ -22,6 +22,7 @@ from service.mesh.formats import READERS, read_mesh
 from service.mesh.frame import CANONICAL, Orientation
 from service.pipeline import edit, infer
 from service.requests import UNITS, EditOptions, InferOptions, Upload
+from service.template.loader import load_template
 
 MODELS = Path(service.__file__).parent / "models"
 VALUES = {
@@ -97,7 +98,7 @@ def test_the_report_is_whole_and_consistent(
     assert json.loads(json.dumps(report, allow_nan=False)) == report
     assert report["mesh_id"] == f"sha256-{hashlib.sha256(chair_glb).hexdigest()}"
     assert report["category"] == "chair"
-    assert list(report["parameters"]) == list(models["chair"].template.names)
+    assert list(report["parameters"]) == list(VALUES)
     for entry in (*report["parameters"].values(), *report["derived"].values()):
         assert entry["unit"] == "m"
         assert entry["value"] > 0
@@ -205,7 +206,7 @@ def test_every_parameter_can_grow_by_a_fifth(
     edits = json.dumps({name: {"scale": 1.2}})
     edited = change(Upload(chair_glb, "chair.glb"), models, edits, mode=mode)
     moved = vertices_of(edited)
-    template = models["chair"].template
+    template = load_template("paper_chair")
     before = values_of(found)
     f = np.array([before[n] for n in template.names])
     after = f.copy()
@@ -457,8 +458,7 @@ def test_an_edit_beyond_the_ranges_is_made_and_warned_of(
     (warning,) = edited.report["warnings"]
     assert warning.startswith("back_height is outside of what the model was trained on")
     # A larger chair of the same proportions is nothing out of the ordinary.
-    names = models["chair"].template.names
-    twice = json.dumps({name: {"scale": 2.0} for name in names})
+    twice = json.dumps({name: {"scale": 2.0} for name in VALUES})
     assert change(Upload(chair_glb, "chair.glb"), models, twice).report["warnings"] == []
 
 

@@ -18,6 +18,7 @@ from model_export.truth import Judged, Measured
 from service.encode.model import Model, load_models
 from service.mesh.frame import CANONICAL
 from service.mesh.surface import Samples, sample_surface
+from service.template.loader import load_template
 
 MODELS = Path(__file__).parents[2] / "service" / "models"
 
@@ -30,12 +31,13 @@ def model() -> Model:
 def drawn(model: Model, count: int, noise: float = 0.0) -> list[Samples]:
     """Box chairs of growing seats."""
     rng = np.random.default_rng(0)
+    template = load_template("paper_chair")
     f = np.array([0.42, 0.04, 0.06, 0.45, 0.48, 0.40, 0.05, 0.05])
     found = []
     for index in range(count):
-        vertices = model.template.decode(f + np.eye(8)[4] * 0.02 * index)
+        vertices = template.decode(f + np.eye(8)[4] * 0.02 * index)
         vertices = vertices + noise * rng.standard_normal(vertices.shape)
-        found.append(sample_surface(vertices, model.template.faces, model.points, rng))
+        found.append(sample_surface(vertices, template.faces, model.points, rng))
     return found
 
 

@@ -125,24 +125,28 @@ def test_the_card_says_what_the_data_was(meshes: Path, tmp_path: Path) -> None:
     assert list(licences.items()) == [("CC0-1.0", 3), ("MIT", 2)]
 
 
-@pytest.fixture(scope="module")
-def exported(state: dict[str, Any], meshes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A models folder that the command line wrote."""
-    folder = tmp_path_factory.mktemp("export")
-    run, out = folder / "run", folder / "models"
-    run.mkdir()
-    torch.save(state, run / "checkpoint.pt")
-    (folder / "ablation.json").write_text('{"no editing": 1}', "utf-8")
-    arguments = ["export", "stand", "--run", run, "--realistic", meshes, "--out", out,
-                 "--cache", folder / "cache", "--version", "3.1.0", "--count", "3",
-                 "--refit", "200", "--steps", "2",
-                 "--ablation", folder / "ablation.json"]  # fmt: skip
+def run_export(folder: Path, meshes: Path, *more: object) -> None:
+    """The command line on the run in the folder."""
+    arguments = ["export", "stand", "--run", folder / "run", "--realistic", meshes,
+                 "--out", folder / "models", "--cache", folder / "cache", "--count", "3",
+                 "--refit", "200", *more]  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
         heaps = discriminate.heaps
         patch.setattr(discriminate, "heaps", lambda count, *rest: heaps(10, *rest))
         patch.setattr("sys.argv", list(map(str, arguments)))
         export.main()
-    return out
+
+
+@pytest.fixture(scope="module")
+def exported(state: dict[str, Any], meshes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A models folder that the command line wrote."""
+    folder = tmp_path_factory.mktemp("export")
+    (folder / "run").mkdir()
+    torch.save(state, folder / "run" / "checkpoint.pt")
+    ablation = folder / "ablation.json"
+    ablation.write_text('{"no editing": 1}', "utf-8")
+    run_export(folder, meshes, "--version", "3.1.0", "--steps", "2", "--ablation", ablation)
+    return folder / "models"
 
 
 def test_the_command_line_writes_a_model_that_the_service_loads(exported: Path) -> None:
@@ -182,3 +186,14 @@ def test_an_altered_export_is_noticed(
     with pytest.raises(ModelFault) as caught:
         load_models(folder)["stand"].verify()
     assert caught.value.code == code
+
+
+def test_a_discriminator_can_be_kept(exported: Path, meshes: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(exported.parent, tmp_path / "copy")
+    before = json.loads((folder / "models" / "stand.json").read_text("utf-8"))
+    run_export(folder, meshes, "--version", "3.2.0", "--keep-discriminator")
+    model = load_models(folder / "models")["stand"]
+    model.verify()
+    assert model.version == "3.2.0"
+    assert model.card["discriminator"] == before["discriminator"]
+    assert before["discriminator"]["steps"] == 2
