@@ -89,7 +89,7 @@ class Model:
     @property
     def sigma_floor(self) -> NDArray[np.float64]:
         """``[d]`` least standard deviations claimed for refined parameters, normalised."""
-        floors = self.card["calibration"].get("sigma_floor", {})
+        floors = self.card.get("calibration", {}).get("sigma_floor", {})
         return np.array([float(floors.get(name, SIGMA_FLOOR)) for name in self.template.names])
 
     def score(self, distance: float, odds: float) -> float:
