@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,8 +76,7 @@ class AffineTemplate:
     def variants(self) -> tuple[AffineTemplate, ...]:
         """The template of each variant, with its own parts only: what a shape is fitted by.
 
-        They share the parameters; one that moves none of a variant's parts is idle there.
-        """
+    XX        """
         if not self.present:
             return (self,)
         return tuple(self._restricted(name, has) for name, has in self.present.items())
@@ -84,8 +84,12 @@ class AffineTemplate:
     def _restricted(self, name: str, has: NDArray[np.bool_]) -> AffineTemplate:
         own_vertex, own_face = has[self.part], has[self.part[self.faces[:, 0]]]
         vertex, part = np.cumsum(own_vertex) - 1, np.cumsum(has) - 1
+        idle = ~self.jacobian[own_vertex].any(axis=(0, 1))
+        held = ~self.relations[:, 1:][:, idle].any(axis=1)
         return replace(
             self,
+            relations=self.relations[held],
+            relation_texts=tuple(compress(self.relation_texts, held)),
             base=self.base[own_vertex],
             jacobian=self.jacobian[own_vertex],
             faces=vertex[self.faces[own_face]],

@@ -238,3 +238,17 @@ def test_parameters_are_given_by_name(chair: AffineTemplate) -> None:
     f = dict(zip(plane.names, plane.vector({**public, "wing_sweep": 0.2}), strict=True))
     assert (f["wing_length"], f["wing_sweep"], f["wing_height"]) == (1.0, 0.2, 0.0)
     assert f["wing_root_chord"] == pytest.approx(0.05), "no chord is nothing"
+
+
+def test_a_variant_keeps_the_relations_of_what_it_has() -> None:
+    variants = {variant.variant: variant for variant in load_template("chair").variants}
+    base, arms, insets = (
+        {name for name, v in variants.items() if any(word in t for t in v.relation_texts)}
+        for word in ("base_height", "arm_height", "rear_inset")
+    )
+    assert base == {"pedestal_chair", "pedestal_armchair"}
+    assert arms == {"armchair", "pedestal_armchair"}
+    assert insets == {"chair", "armchair"}
+    for variant in variants.values():
+        assert len(variant.relations) == len(variant.relation_texts)
+        assert "seat_depth - back_thickness - back_inset" in variant.relation_texts
