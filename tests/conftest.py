@@ -12,6 +12,7 @@ import httpx
 import pytest
 import trimesh
 import uvicorn
+from plain_chair import PLAIN
 from starlette.types import ASGIApp
 
 from service.api.schemas import ProblemDocument
@@ -87,17 +88,7 @@ def service_client() -> Iterator[httpx.Client]:
 def box_chair() -> trimesh.Trimesh:
     """The template at plain values, in metres, standing on y = 0: seat top at 0.46."""
     template = load_template("paper_chair")
-    values = {
-        "back_height": 0.42,
-        "back_thickness": 0.04,
-        "seat_thickness": 0.06,
-        "seat_depth": 0.45,
-        "seat_width": 0.48,
-        "leg_height": 0.40,
-        "leg_depth": 0.05,
-        "leg_width": 0.05,
-    }
-    vertices = template.decode([values[name] for name in template.names])
+    vertices = template.decode([PLAIN[name] for name in template.names])
     vertices = vertices - [0.0, vertices[:, 1].min(), 0.0]
     return trimesh.Trimesh(vertices, template.faces, process=False)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from plain_chair import PLAIN
 from scipy.spatial.transform import Rotation
 from trimesh.exchange.export import export_mesh
 
@@ -25,17 +26,6 @@ from service.requests import UNITS, EditOptions, InferOptions, Upload
 from service.template.loader import load_template
 
 MODELS = Path(service.__file__).parent / "models"
-VALUES = {
-    "back_height": 0.42,
-    "back_thickness": 0.04,
-    "seat_thickness": 0.06,
-    "seat_depth": 0.45,
-    "seat_width": 0.48,
-    "leg_height": 0.40,
-    "leg_depth": 0.05,
-    "leg_width": 0.05,
-}
-"""Of the chair that is uploaded, in metres."""
 NEAR = 0.01
 """How close an ordinary chair's parameters are found, in metres."""
 Z_UP = Orientation(up="+z", front="-y")
@@ -81,7 +71,7 @@ def values_of(found: Inference) -> dict[str, float]:
 
 
 def test_a_chair_is_measured_in_metres(found: Inference) -> None:
-    assert values_of(found) == pytest.approx(VALUES, abs=NEAR)
+    assert values_of(found) == pytest.approx(PLAIN, abs=NEAR)
     derived = found.report()["derived"]
     assert derived["seat_top_height"]["value"] == pytest.approx(0.46, abs=NEAR)
     sizes = {name: entry["value"] for name, entry in derived.items() if "total" in name}
@@ -98,7 +88,7 @@ def test_the_report_is_whole_and_consistent(
     assert json.loads(json.dumps(report, allow_nan=False)) == report
     assert report["mesh_id"] == f"sha256-{hashlib.sha256(chair_glb).hexdigest()}"
     assert report["category"] == "chair"
-    assert list(report["parameters"]) == list(VALUES)
+    assert list(report["parameters"]) == list(PLAIN)
     for entry in (*report["parameters"].values(), *report["derived"].values()):
         assert entry["unit"] == "m"
         assert entry["value"] > 0
@@ -198,7 +188,7 @@ def test_an_edit_moves_what_it_names_and_little_else(
 
 
 @pytest.mark.parametrize(
-    ("name", "mode"), [*((name, "blend") for name in VALUES), ("seat_width", "paper")]
+    ("name", "mode"), [*((name, "blend") for name in PLAIN), ("seat_width", "paper")]
 )
 def test_every_parameter_can_grow_by_a_fifth(
     chair_glb: bytes, models: dict[str, Model], found: Inference, name: str, mode: str
@@ -247,7 +237,7 @@ def test_the_report_of_an_edit_agrees_with_its_values(
     assert report["parameters"]["seat_width"]["after"] == 0.6
     assert report["derived"]["seat_top_height"]["after"] == pytest.approx(0.5)
     assert edited.parameters["seat_top_height"] == pytest.approx(0.5)
-    untouched = set(VALUES) - {"seat_width", "leg_height"}
+    untouched = set(PLAIN) - {"seat_width", "leg_height"}
     assert all(edited.parameters[name] == before[name] for name in untouched)
     assert report["category"] == "chair"
     assert report["model"] == found.report()["model"]
@@ -458,7 +448,7 @@ def test_an_edit_beyond_the_ranges_is_made_and_warned_of(
     (warning,) = edited.report["warnings"]
     assert warning.startswith("back_height is outside of what the model was trained on")
     # A larger chair of the same proportions is nothing out of the ordinary.
-    twice = json.dumps({name: {"scale": 2.0} for name in VALUES})
+    twice = json.dumps({name: {"scale": 2.0} for name in PLAIN})
     assert change(Upload(chair_glb, "chair.glb"), models, twice).report["warnings"] == []
 
 
@@ -466,7 +456,7 @@ def test_an_edit_beyond_the_ranges_is_made_and_warned_of(
 def test_large_edits_are_carried_out(
     chair_glb: bytes, models: dict[str, Model], found: Inference, factor: float
 ) -> None:
-    edits = json.dumps({name: {"scale": factor} for name in VALUES})
+    edits = json.dumps({name: {"scale": factor} for name in PLAIN})
     edited = change(Upload(chair_glb, "chair.glb"), models, edits)
     before = np.ptp(found.mesh.vertices, axis=0)
     np.testing.assert_allclose(np.ptp(vertices_of(edited), axis=0), factor * before, rtol=0.05)

@@ -2,12 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from plain_chair import PLAIN
 
 from service.sizes import size_ratio, size_warning
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
 
-PLAIN = np.array([0.42, 0.04, 0.06, 0.45, 0.48, 0.40, 0.05, 0.05])
+VALUES = np.array(list(PLAIN.values()))
 
 
 @pytest.fixture(scope="module")
@@ -17,9 +18,9 @@ def chair() -> AffineTemplate:
 
 @pytest.mark.parametrize("scale", [0.3, 1.0, 2.5])
 def test_chairs_of_sensible_sizes_are_passed_over(chair: AffineTemplate, scale: float) -> None:
-    assert size_ratio(chair, PLAIN * scale) == pytest.approx(scale, rel=0.2)
-    assert size_warning(chair, PLAIN * scale, "obj", "m") is None
-    assert size_warning(chair, PLAIN * scale, "glb", "cm") is None
+    assert size_ratio(chair, VALUES * scale) == pytest.approx(scale, rel=0.2)
+    assert size_warning(chair, VALUES * scale, "obj", "m") is None
+    assert size_warning(chair, VALUES * scale, "glb", "cm") is None
 
 
 @pytest.mark.parametrize(
@@ -29,14 +30,14 @@ def test_chairs_of_sensible_sizes_are_passed_over(chair: AffineTemplate, scale: 
 def test_the_likelier_unit_is_named(
     chair: AffineTemplate, scale: float, unit: str, likely: str
 ) -> None:
-    warning = size_warning(chair, PLAIN * scale, "obj", unit)
+    warning = size_warning(chair, VALUES * scale, "obj", unit)
     assert warning is not None
     assert warning.endswith(f"it seems to be in {likely}: say units={likely}")
     assert f"with {unit} as the unit" in warning
 
 
 def test_gltf_is_in_metres_whatever_the_client_says(chair: AffineTemplate) -> None:
-    warning = size_warning(chair, PLAIN * 100, "glb", "cm")
+    warning = size_warning(chair, VALUES * 100, "glb", "cm")
     assert warning is not None
     assert warning.endswith("it seems to be in cm, but its format's unit is the metre")
     assert "with metres as the unit" in warning
@@ -44,7 +45,7 @@ def test_gltf_is_in_metres_whatever_the_client_says(chair: AffineTemplate) -> No
 
 def test_a_size_that_no_unit_explains_is_told(chair: AffineTemplate) -> None:
     for scale in (1e-6, 1e6):
-        warning = size_warning(chair, PLAIN * scale, "ply", "m")
+        warning = size_warning(chair, VALUES * scale, "ply", "m")
         assert warning is not None
         assert "arbitrary" in warning
 

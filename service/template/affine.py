@@ -76,7 +76,7 @@ class AffineTemplate:
     def variants(self) -> tuple[AffineTemplate, ...]:
         """The template of each variant, with its own parts only: what a shape is fitted by.
 
-    XX        """
+        XX"""
         if not self.present:
             return (self,)
         return tuple(self._restricted(name, has) for name, has in self.present.items())

@@ -10,6 +10,7 @@ import onnx
 import pytest
 from numpy.typing import NDArray
 from onnx import TensorProto, helper
+from plain_chair import PLAIN
 
 import service
 from service.encode.distance import Cloud
@@ -22,17 +23,6 @@ Array = NDArray[np.float64]
 Labelled = tuple[Cloud, Array, Array]
 WriteNetwork = Callable[..., Path]
 WriteDiscriminator = Callable[[Path], Path]
-
-PLAIN = {
-    "back_height": 0.42,
-    "back_thickness": 0.04,
-    "seat_thickness": 0.06,
-    "seat_depth": 0.45,
-    "seat_width": 0.48,
-    "leg_height": 0.40,
-    "leg_depth": 0.05,
-    "leg_width": 0.05,
-}
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from plain_chair import PLAIN
 
 from model_export.calibrate import (
     DRAWN_FARTHER,
@@ -32,7 +33,7 @@ def drawn(model: Model, count: int, noise: float = 0.0) -> list[Samples]:
     """Box chairs of growing seats."""
     rng = np.random.default_rng(0)
     template = load_template("paper_chair")
-    f = np.array([0.42, 0.04, 0.06, 0.45, 0.48, 0.40, 0.05, 0.05])
+    f = np.array(list(PLAIN.values()))
     found = []
     for index in range(count):
         vertices = template.decode(f + np.eye(8)[4] * 0.02 * index)

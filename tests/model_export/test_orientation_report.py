@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from plain_chair import PLAIN
 
 from model_export import orientation_report
 from model_export.config import SHIPPED
@@ -14,7 +15,7 @@ from service.encode.model import load_models
 from service.mesh.frame import Orientation
 from service.template.affine import AffineTemplate
 
-PLAIN = np.array([0.42, 0.04, 0.06, 0.45, 0.48, 0.40, 0.05, 0.05])
+VALUES = np.array(list(PLAIN.values()))
 
 
 def heights(turns: list[np.ndarray]) -> list[float]:
@@ -23,7 +24,7 @@ def heights(turns: list[np.ndarray]) -> list[float]:
 
 
 def test_a_chair_looks_like_itself_from_one_side_only(chair: AffineTemplate) -> None:
-    (turn,) = looks_the_same(chair.decode(PLAIN), chair.faces)
+    (turn,) = looks_the_same(chair.decode(VALUES), chair.faces)
     np.testing.assert_array_equal(turn, np.eye(3))
 
 
@@ -37,7 +38,7 @@ def test_a_square_slab_has_eight_sides_alike_and_a_cube_all_24() -> None:
 def test_a_chair_is_found_whichever_way_it_faces(
     chair: AffineTemplate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mesh = trimesh.Trimesh(chair.decode(PLAIN), chair.faces, process=False)
+    mesh = trimesh.Trimesh(chair.decode(VALUES), chair.faces, process=False)
     mesh.export(tmp_path / "chair.ply")
     ways = [Orientation("+z", "-y"), Orientation("-y", "+x")]
     monkeypatch.setattr(orientation_report, "TURNS", ways)
@@ -52,7 +53,7 @@ def test_a_chair_is_found_whichever_way_it_faces(
 def test_another_orientation_than_the_shapes_own_is_wrong(
     chair: AffineTemplate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mesh = trimesh.Trimesh(chair.decode(PLAIN), chair.faces, process=False)
+    mesh = trimesh.Trimesh(chair.decode(VALUES), chair.faces, process=False)
     mesh.export(tmp_path / "chair.ply")
     monkeypatch.setattr(orientation_report, "TURNS", [Orientation("+z", "-y")])
     (shape,) = find_shapes(tmp_path)

@@ -5,22 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from plain_chair import PLAIN
 
 from model_export.synthetic import Augmentation, Batch, SyntheticShapes
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
 
 CLEAN = Augmentation.none()
-PLAIN = {
-    "back_height": 0.42,
-    "back_thickness": 0.04,
-    "seat_thickness": 0.06,
-    "seat_depth": 0.45,
-    "seat_width": 0.48,
-    "leg_height": 0.40,
-    "leg_depth": 0.05,
-    "leg_width": 0.05,
-}
 
 
 def off_surface(template: AffineTemplate, batch: Batch) -> np.ndarray:
