@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.template.expressions import parse_rows
+from service.template.expressions import ExpressionError, parse_rows
+from service.template.sections import swelling
 from service.template.shapes import RUN, unit_shape
 from service.template.unitshape import UnitShape
 
@@ -29,6 +30,7 @@ class Part:
         shape: its mesh.
         frame: ``[3, 4, 1 + d]`` and
         taper: ``[3, 3, 1 + d]`` affine rows of its map (see `service.template.frames`).
+        swell: ``[n, 3, 1 + d]`` what its sections add to that (see `service.template.sections`).
         run: the axis it runs along.
         hidden: ``[m]`` bool, faces that are never seen from outside.
     """
@@ -37,13 +39,14 @@ class Part:
     shape: UnitShape
     frame: Array
     taper: Array
+    swell: Array
     run: int
     hidden: NDArray[np.bool_]
 
     def vertices(self) -> Array:
         """``[n, 3, 1 + d]`` affine rows of the vertices' coordinates."""
         unit = self.shape.vertices
-        straight = np.einsum("vk,ckd->vcd", homogeneous(unit), self.frame)
+        straight = np.einsum("vk,ckd->vcd", homogeneous(unit), self.frame) + self.swell
         if not self.taper.any():
             return straight
         s = unit[:, self.run, None]
@@ -60,6 +63,7 @@ class Part:
             shape=replace(self.shape, faces=faces),
             frame=sign * self.frame,
             taper=sign * self.taper,
+            swell=sign[:, 0] * self.swell,
         )
 
 
@@ -69,7 +73,8 @@ def read_parts(name: str, entry: Mapping[str, Any], names: Sequence[str]) -> lis
     Args:
         name: of the part.
         entry: ``shape`` and its options; ``center`` and ``size``, or ``start`` and ``end`` of a
-            part that tapers or leans ``along`` an axis; ``hidden`` sides; ``mirror``.
+            part that tapers or leans ``along`` an axis; ``sections`` that swell between them;
+            ``hidden`` sides; ``mirror``.
         names: of the parameters.
 
     Raises:
@@ -81,6 +86,11 @@ def read_parts(name: str, entry: Mapping[str, Any], names: Sequence[str]) -> lis
         raise PartError(f"part {name!r}: along {along!r} is no axis; use x, y or z")
     try:
         shape = unit_shape(entry, along)
+        swell = np.zeros((*shape.vertices.shape, 1 + len(names)))
+        if "sections" in entry:
+            swell = swelling(entry["sections"], shape.vertices, "xyz".index(along), names)
+    except ExpressionError:
+        raise
     except ValueError as error:
         raise PartError(f"part {name!r}: {error}") from error
     hidden = entry.get("hidden", [])
@@ -90,7 +100,7 @@ def read_parts(name: str, entry: Mapping[str, Any], names: Sequence[str]) -> lis
     run = "xyz".index(along)
     frame, taper = _between(entry, names, run) if "start" in entry else _sized(entry, names)
     is_hidden = np.isin(shape.side, [shape.sides.index(side) for side in hidden])
-    part = Part(name, shape, frame, taper, run, is_hidden)
+    part = Part(name, shape, frame, taper, swell, run, is_hidden)
     return [part, *(part.mirrored(n, axes) for n, axes in entry.get("mirror", {}).items())]
 
 
