@@ -85,11 +85,11 @@ class AffineTemplate:
         own_vertex, own_face = has[self.part], has[self.part[self.faces[:, 0]]]
         vertex, part = np.cumsum(own_vertex) - 1, np.cumsum(has) - 1
         idle = ~self.jacobian[own_vertex].any(axis=(0, 1))
-        held = ~self.relations[:, 1:][:, idle].any(axis=1)
+        held = ~(self.relations[:, 1:][:, idle] != 0.0).any(axis=1)
         return replace(
             self,
             relations=self.relations[held],
-            relation_texts=tuple(compress(self.relation_texts, held)),
+            relation_texts=tuple(compress(self.relation_texts, held.tolist())),
             base=self.base[own_vertex],
             jacobian=self.jacobian[own_vertex],
             faces=vertex[self.faces[own_face]],
