@@ -26,6 +26,10 @@ SLIDE = 0.1
 """Weight of residuals along the surface, relative to those across it,"""
 EDGE = 0.015
 """where they are shorter than this; longer ones are off an edge."""
+OUTWARD, NEAR = 4.0, 0.04
+"""Weight of what lies outside of the template, relative to what lies inside, where it is no farther
+than this: a box has the size of what it encloses, a rounded seat or a turned leg, and not of its
+mean surface."""
 EXTENT_WEIGHT, EXTENT_SCALE = 0.1, 0.03
 """Weight of each of the six extents beside that of all pairs, 2, and how far off it may be before
 it is told by what the template lacks (a wheel, an aerial)."""
@@ -126,6 +130,7 @@ def normal_equations(moving: MovingSamples, matcher: Matcher, state: Array, scal
     weight = share / (1.0 + squared / scale**2) ** 2
     cost = float((share * squared / (1.0 + squared / scale**2)).sum())
     off = np.einsum("pc,pc->p", normals[sample], gap)
+    weight *= np.where(off < 0.0, 1.0 + (OUTWARD - 1.0) / (1.0 + squared / NEAR**2) ** 2, 1.0)
     along = np.maximum(squared - off**2, 0.0)
     even = weight * (SLIDE + (1.0 - SLIDE) * along / (along + EDGE**2))
     # Samples are few and pairs many: gather the pairs' sums on their samples first.
