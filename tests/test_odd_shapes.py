@@ -25,6 +25,7 @@ PLANE = {
     "wing_root_chord": 5.5, "wing_tip_chord": 1.8, "wing_sweep": 4.0, "wing_position": 1.0,
     "wing_height": -1.2, "wing_dihedral": 1.0, "vertical_stabilizer_chord": 5.0,
     "vertical_stabilizer_position": 0.6, "horizontal_stabilizer_chord": 3.4,
+    "horizontal_stabilizer_tip_chord": 2.0, "horizontal_stabilizer_sweep": 1.2,
     "horizontal_stabilizer_height": 0.0, "horizontal_stabilizer_position": 0.2,
 }  # fmt: skip
 TAILPLANE = ("left_horizontal_stabilizer", "right_horizontal_stabilizer")

@@ -88,7 +88,7 @@ class _Fit:
 def _fit(template: AffineTemplate, f: Array) -> _Fit:
     cut, starts = rooted(template, f)
     maps = cut.maps(f)
-    parts = lofts(template, maps.frames, maps.tapers, starts)
+    parts = lofts(template, f, maps.frames, maps.tapers, starts)
     boxes = Boxes(maps.frames, inverse_frames(maps.frames), parts)
     return _Fit(cut, f, boxes, mirror_groups(cut))
 

@@ -107,30 +107,41 @@ class Loft:
         return np.hypot(aside, (along - s) * np.float32(self.length))
 
 
-def lofts(template: AffineTemplate, frames: Array, tapers: Array, starts: Array) -> dict[int, Loft]:
+def lofts(
+    template: AffineTemplate, f: Array, frames: Array, tapers: Array, starts: Array
+) -> dict[int, Loft]:
     """The parts of a template that are no plain boxes.
 
     Args:
         template: the category's.
+        f: ``[d]`` bound parameters.
         frames, tapers: ``[P, 3, 4]`` and ``[P, 3, 3]`` of the parts as they are bound, which begin
         starts: ``[P]`` so far along the template's own.
     """
+    # Thin parts are seen more clearly in the middle of the ranges, swollen ones as they are.
     middle = (template.low + template.high) / 2
-    u = template.maps(middle).unit(template.decode(middle))
+    plain, own = (template.maps(g).unit(template.decode(g)) for g in (middle, f))
     found = {}
     for part, run in enumerate(template.run):
-        outline = _outline(u[template.part == part, part], int(run), starts[part])
+        of_part = template.part == part
+        outline = None
+        if not _is_box(plain[of_part, part], int(run)):
+            outline = _outline(own[of_part, part], int(run), starts[part])
         taper = np.diagonal(tapers[part])
         if outline is not None or taper.any():
             found[part] = Loft(frames[part], taper, int(run), outline)
     return found
 
 
-def _outline(u: Array, run: int, start: float) -> Outline | None:
-    """Of a unit shape's vertices ``u [n, 3]``, from ``start`` on; None for a box."""
+def _is_box(u: Array, run: int) -> bool:
+    """Whether a unit shape's vertices ``u [n, 3]`` fill the corners of its sections."""
     across = np.delete(u, run, axis=1)
-    if np.abs(2.0 * across).min(axis=1).max() > FILLED:
-        return None
+    return bool(np.abs(2.0 * across).min(axis=1).max() > FILLED)
+
+
+def _outline(u: Array, run: int, start: float) -> Outline:
+    """Of a unit shape's vertices ``u [n, 3]``, from ``start`` on."""
+    across = np.delete(u, run, axis=1)
     levels, ring = np.unique(np.round(u[:, run], 6), return_inverse=True)
     low, high = np.full((len(levels), 2), np.inf), np.full((len(levels), 2), -np.inf)
     np.minimum.at(low, ring, across)

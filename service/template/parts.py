@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.template.expressions import ExpressionError, parse_rows
-from service.template.sections import swelling
 from service.template.shapes import RUN, unit_shape
+from service.template.swelling import swelling
 from service.template.unitshape import UnitShape
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ class Part:
         shape: its mesh.
         frame: ``[3, 4, 1 + d]`` and
         taper: ``[3, 3, 1 + d]`` affine rows of its map (see `service.template.frames`).
-        swell: ``[n, 3, 1 + d]`` what its sections add to that (see `service.template.sections`).
+        swell: ``[n, 3, 1 + d]`` what its sections add to that (see `service.template.swelling`).
         run: the axis it runs along.
         hidden: ``[m]`` bool, faces that are never seen from outside.
     """

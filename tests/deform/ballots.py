@@ -25,7 +25,7 @@ def votes_of(
     welded = weld(*mesh)
     cut, starts = rooted(template, f)
     maps = cut.maps(f)
-    found = lofts(template, maps.frames, maps.tapers, starts)
+    found = lofts(template, f, maps.frames, maps.tapers, starts)
     boxes = Boxes(maps.frames, inverse_frames(maps.frames), found)
     x = welded.vertices - ORIGIN
     u = boxes.local(x)

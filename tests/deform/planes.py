@@ -26,6 +26,8 @@ VALUES = {
     "vertical_stabilizer_chord": 0.14,
     "vertical_stabilizer_position": 0.02,
     "horizontal_stabilizer_chord": 0.1,
+    "horizontal_stabilizer_tip_chord": 0.06,
+    "horizontal_stabilizer_sweep": 0.035,
     "horizontal_stabilizer_height": 0.12,
     "horizontal_stabilizer_position": 0.0,
 }
@@ -37,7 +39,7 @@ def airplane() -> AffineTemplate:
 
 def plane_values() -> NDArray[np.float64]:
     """A T-tail of the size that the normalised frame has them."""
-    return np.array([VALUES[name] for name in airplane().names])
+    return airplane().vector(VALUES)
 
 
 def plane() -> AffineTemplate:
@@ -47,7 +49,7 @@ def plane() -> AffineTemplate:
 
 def plane_change(name: str, factor: float) -> NDArray[np.float64]:
     """The change that scales one parameter."""
-    df = np.zeros(len(VALUES))
+    df = np.zeros(len(airplane().names))
     df[airplane().names.index(name)] = (factor - 1.0) * VALUES[name]
     return df
 

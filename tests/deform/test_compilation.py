@@ -14,7 +14,7 @@ from service.template.affine import AffineTemplate
 def compiled(template: AffineTemplate, f: np.ndarray, u: np.ndarray, part: np.ndarray) -> Binding:
     """Points inside parts, each wholly of its own."""
     maps = template.maps(f)
-    found = lofts(template, maps.frames, maps.tapers, np.full(len(maps.run), -0.5))
+    found = lofts(template, f, maps.frames, maps.tapers, np.full(len(maps.run), -0.5))
     boxes = Boxes(maps.frames, inverse_frames(maps.frames), found)
     weights = np.eye(len(maps.run), dtype=np.float32)[part]
     return compile_binding(template, boxes, weights, u.astype(np.float32), np.ones_like(u))

@@ -14,7 +14,7 @@ STARTS = np.full(6, -0.5)
 
 def planes_lofts(starts: np.ndarray = STARTS) -> dict[int, Loft]:
     maps = airplane().maps(plane_values())
-    return lofts(airplane(), maps.frames, maps.tapers, starts)
+    return lofts(airplane(), plane_values(), maps.frames, maps.tapers, starts)
 
 
 def distance(part: str, x: np.ndarray) -> float:
@@ -43,7 +43,7 @@ def legs(shape: str) -> AffineTemplate:
 
 def test_boxes_are_none_and_every_part_of_an_airplane_is_one():
     frames = chair().maps(PARAMETERS)
-    assert not lofts(chair(), frames.frames, frames.tapers, STARTS)
+    assert not lofts(chair(), PARAMETERS, frames.frames, frames.tapers, STARTS)
     found = planes_lofts()
     assert list(found) == list(range(6))
     assert [loft.tapered for loft in found.values()] == [False] + 5 * [True]
@@ -97,13 +97,13 @@ def test_behind_and_above_a_flat_wing_it_is_as_far_as_it_is():
 
 def test_off_a_tapered_box_the_distance_is_to_its_section():
     template, f = legs("box"), np.array([0.2, 0.8])
-    loft = lofts(template, template.maps(f).frames, template.maps(f).tapers, STARTS[:1])[0]
+    loft = lofts(template, f, *_maps(template, f), STARTS[:1])[0]
     assert loft.outline is None
     # Half way up it is 0.15 wide.
     x = np.array([[0.075 + 0.03, 0.4, 0.075 + 0.04], [0.0, 0.9, 0.0]])
     np.testing.assert_allclose(loft.distance(loft.unit(x)), [0.05, 0.1], rtol=1e-4)
     tube = legs("tube")
-    assert lofts(tube, *_maps(tube, f), STARTS[:1])[0].outline is not None
+    assert lofts(tube, f, *_maps(tube, f), STARTS[:1])[0].outline is not None
 
 
 def test_a_part_that_begins_later_has_the_rest_of_the_outline():
@@ -121,3 +121,15 @@ def test_nothing_is_nan_far_away_or_on_the_axis():
 def _maps(template: AffineTemplate, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     maps = template.maps(f)
     return maps.frames, maps.tapers
+
+
+def test_a_fuselage_that_swells_is_seen_as_it_is():
+    template, f = airplane(), plane_values()
+    slim = f.copy()
+    slim[template.names.index("tail_width")] = -0.03
+    maps = template.maps(slim)
+    narrow = lofts(template, slim, maps.frames, maps.tapers, STARTS)[0].outline
+    s = np.array([-0.28, 0.15], np.float32)
+    (thin, same), (thick, other) = narrow.at(s)[1][:, 0], planes_lofts()[0].outline.at(s)[1][:, 0]
+    assert thick - thin == pytest.approx(0.5 * 0.03 / VALUES["fuselage_width"], rel=0.1)
+    assert same == pytest.approx(other)

@@ -32,7 +32,7 @@ def test_wings_keep_their_own_to_the_root_and_share_what_is_between():
     f = plane_values()
     cut, starts = rooted(plane(), f)
     maps = cut.maps(f)
-    found = lofts(plane(), maps.frames, maps.tapers, starts)
+    found = lofts(plane(), f, maps.frames, maps.tapers, starts)
     boxes = Boxes(maps.frames, inverse_frames(maps.frames), found)
     across = np.array([-0.4, -0.05, 0.0, 0.0225, 0.05, 0.4])
     x = np.stack([across, np.full(6, -0.02), np.full(6, 0.05)], axis=1)

@@ -25,7 +25,7 @@ def airplane() -> AffineTemplate:
 
 @pytest.fixture(scope="module")
 def f(airplane: AffineTemplate) -> np.ndarray:
-    """A plane with its wings swept back, in the middle of most ranges."""
+    """A plane with its wings swept back, in the middle of most ranges, and a plain fuselage."""
     values = dict(zip(airplane.names, (airplane.low + airplane.high) / 2, strict=True))
     values |= {
         "fuselage_height": 0.12,
@@ -41,6 +41,7 @@ def f(airplane: AffineTemplate) -> np.ndarray:
         "wing_height": -0.03,
         "wing_dihedral": 0.04,
     }
+    values |= {name: 0.0 for name in airplane.names if name.startswith(("nose", "tail"))}
     return np.array([values[name] for name in airplane.names])
 
 
@@ -120,11 +121,32 @@ def test_what_follows_keeps_its_place_beside_what_leads(
     low = f.copy()
     low[height] = 0.0
     assert after(low, fin, 1.5)[height] == 0.0
-    bigger = after(f, body, 1.5)
-    wing = names.index("wing_height")
-    assert bigger[wing] == pytest.approx(1.5 * f[wing])
-    moved = {names[i] for i in np.flatnonzero(bigger != f)}
-    assert moved == {"fuselage_height", "wing_height"}
+    slim = f.copy()
+    slim[[names.index("tail_height"), names.index("tail_rise")]] = -0.03, 0.01
+    bigger = after(slim, body, 1.5)
+    moved = [names[i] for i in np.flatnonzero(bigger != slim)]
+    assert set(moved) == {"fuselage_height", "wing_height", "tail_height", "tail_rise"}
+    for name in moved:
+        assert bigger[names.index(name)] == pytest.approx(1.5 * slim[names.index(name)])
+
+
+def test_the_fuselage_can_taper_to_a_boom_or_end_in_a_nozzle(
+    airplane: AffineTemplate, f: np.ndarray
+) -> None:
+    def widths(**changes: float) -> tuple[float, float]:
+        """A quarter of the length from the tail's end, and at the last ring before it."""
+        values = f.copy()
+        for name, value in changes.items():
+            values[airplane.names.index(name)] = value
+        body, plain = own(airplane, values, "fuselage"), own(airplane, f, "fuselage")
+        z = np.unique(np.round(plain[:, 2], 9))
+        at = z[np.abs(z + 0.25).argmin()]
+        quarter, last = (body[np.isclose(plain[:, 2], place), 0] for place in (at, z[1]))
+        return float(np.ptp(quarter)), float(np.ptp(last))
+
+    plain, boom, nozzle = widths(), widths(tail_width=-0.045), widths(tail_end=0.06)
+    assert boom[0] < 0.5 * plain[0]
+    assert nozzle[1] > plain[1] + 0.04
 
 
 def test_every_parameter_moves_something_and_no_two_alike(airplane: AffineTemplate) -> None:
@@ -156,6 +178,7 @@ def test_maps_carry_unit_shapes_to_the_vertices_and_back(
     unit = airplane.maps(f).unit(vertices)
     mine = unit[np.arange(len(vertices)), airplane.part]
     np.testing.assert_allclose(np.abs(mine).max(axis=0), 0.5, atol=1e-9)
+    # What sections add is no part of the maps.
     other = f * np.linspace(0.7, 1.5, len(f))
     placed = airplane.maps(other).place(np.tile(mine[:, None], (1, len(airplane.parts), 1)))
     moved = placed[np.arange(len(vertices)), airplane.part]
