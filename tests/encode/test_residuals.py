@@ -48,7 +48,7 @@ def test_at_the_answer_there_is_nothing_to_do() -> None:
     assert np.linalg.eigvalsh(system.hessian).min() > 0
     step = np.linalg.solve(system.hessian, -system.gradient)
     assert np.abs(step).max() < 2e-3
-    away = normal_equations(moving, matcher, state + [0.05, 0, 0, 0, 0], 0.05)
+    away = normal_equations(moving, matcher, state + 0.05 * np.eye(5)[0], 0.05)
     assert away.cost > 1.5 * system.cost
 
 
