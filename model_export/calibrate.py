@@ -9,7 +9,7 @@ import numpy as np
 from model_export.realistic import RealisticShape
 from model_export.truth import Judged
 from service.encode.estimate import estimate
-from service.encode.model import Model
+from service.encode.model import SIGMA_FLOOR, Model
 from service.mesh.formats import read_mesh
 from service.mesh.frame import CANONICAL
 from service.mesh.surface import Samples, sample_surface
@@ -24,6 +24,8 @@ FEWEST = 15
 """Measured shapes from which on errors are counted."""
 WITHIN = 0.68
 """Share of errors that a standard deviation covers."""
+LEAST_SCALE = 0.05
+"""A fit that leaves a parameter open says so, however good fits are for the most part."""
 
 
 def calibrate(
@@ -54,22 +56,24 @@ def _samples(model: Model, shape: RealisticShape) -> Samples:
     return sample_surface(mesh.vertices, mesh.faces, model.points, np.random.default_rng(0))
 
 
-def sigma_floors(judged: Sequence[Judged]) -> dict[str, float]:
-    """Least standard deviations with which `WITHIN` of the measured errors lie within sigma.
+def sigma_scales(judged: Sequence[Judged]) -> dict[str, float]:
+    """What to multiply a fit's standard deviations by, so that `WITHIN` of the measured errors lie
+    within sigma.
 
-    What the fit itself claims is added to in quadrature, for what it can't know: which of several
-    readings of a dimension is meant, or that the template lacks something.
+    Above 1 it stands for what a fit can't know: which of several readings of a dimension is meant,
+    or that the template lacks something.
 
     Args:
-        judged: answers with claims of any floor; normalised lengths come out.
+        judged: answers with claims of any scale.
     """
-    floors = {}
+    scales = {}
     for name in dict.fromkeys(name for entry in judged for name in entry.sigma):
         rows = [entry for entry in judged if name in entry.refined]
         if len(rows) < FEWEST:
             continue
         error = np.array([entry.refined[name] * entry.unit for entry in rows])
         fit = np.array([entry.fitted_sigma[name] for entry in rows])
-        missing = np.sqrt(np.maximum(error**2 - fit**2, 0.0))
-        floors[name] = round(float(np.quantile(missing, WITHIN)), 5)
-    return floors
+        beyond = np.sqrt(np.maximum(error**2 - SIGMA_FLOOR**2, 0.0))
+        scale = np.quantile(beyond / np.maximum(fit, 1e-9), WITHIN)
+        scales[name] = round(max(float(scale), LEAST_SCALE), 3)
+    return scales

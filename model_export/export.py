@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from model_export.calibrate import sigma_floors
+from model_export.calibrate import sigma_scales
 from model_export.config import SHIPPED, from_plain
 from model_export.discriminate import Data, assess, build
 from model_export.evaluate import real_fits, synthetic_table
@@ -214,8 +214,8 @@ def main() -> None:
         card["metrics"]["realistic"] = real_fits(model, held_out)
     if arguments.realistic and arguments.truth:
         truth = read_truth(arguments.truth)
-        floors = sigma_floors(judge(model, arguments.realistic, truth))
-        card["calibration"]["sigma_floor"] = floors
+        scales = sigma_scales(judge(model, arguments.realistic, truth))
+        card["calibration"]["sigma_scale"] = scales
         card["metrics"]["truth"] = summary(judge(model, arguments.realistic, truth))
     if arguments.ablation:
         card["metrics"]["ablation"] = json.loads(arguments.ablation.read_text("utf-8"))

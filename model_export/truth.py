@@ -27,7 +27,7 @@ from model_export.pictures import save_sheet
 from model_export.realistic import RealisticShape, find_shapes
 from model_export.samples import Inferred, infer_shape
 from service.deform.dimensions import Dimensions
-from service.encode.model import Model
+from service.encode.model import SIGMA_FLOOR, Model
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ class Judged:
         shape, measured: the shape.
         encoder, refined: percent off by dimension, of the encoder alone and with refinement.
         sigma: percent claimed for the refined values.
-        fitted_sigma: normalised, as the fit alone has it, less the model's floor.
+        fitted_sigma: normalised, as the fit alone has it.
         unit: normalised length that a percent of the size is.
     """
 
@@ -127,7 +127,7 @@ def _judged(model: Model, shape: RealisticShape, measured: Measured) -> Judged:
     )
     claimed = 100 * sigma / normalization.scale / measured.size
     claims = dict(zip(model.template.names, claimed.tolist(), strict=True))
-    alone = np.sqrt(np.maximum(sigma**2 - model.sigma_floor**2, 0.0))
+    alone = np.sqrt(np.maximum(sigma**2 - SIGMA_FLOOR**2, 0.0)) / model.sigma_scale
     fitted = dict(zip(model.template.names, alone.tolist(), strict=True))
     unit = 0.01 * measured.size * normalization.scale
     return Judged(shape, measured, encoder, refined, claims, fitted, unit)

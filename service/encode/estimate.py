@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from service.encode.distance import Cloud, surface_distance
-from service.encode.model import STEEPNESS, Encoding, Model
+from service.encode.model import SIGMA_FLOOR, STEEPNESS, Encoding, Model
 from service.encode.refine import STANDARD, Settings, refine
 from service.mesh.surface import Normalization, Samples, sample_surface
 from service.template.affine import AffineTemplate
@@ -90,7 +90,7 @@ def estimate(
             continue
         variant = model.template.variants[index]
         start = _encoded(variant, encoding, cloud, normalization, inside_out)
-        fit = _refined(start, cloud, settings, model.sigma_floor)
+        fit = _refined(start, cloud, settings, model.sigma_scale)
         # As in recognition: how likely it seemed, and how well it fits.
         fits.append((encoding.shares[index] * fit.distance**-STEEPNESS, fit))
     return max(fits, key=lambda pair: pair[0])[1]
@@ -112,8 +112,8 @@ def _encoded(
     )
 
 
-def _refined(start: Estimate, cloud: Cloud, settings: Settings, floor: Array) -> Estimate:
-    """A fit from the encoder's answer on, unless it goes astray; sigma is at least ``floor``."""
+def _refined(start: Estimate, cloud: Cloud, settings: Settings, scale: Array) -> Estimate:
+    """A fit from the encoder's answer on, unless it goes astray; its sigma is times ``scale``."""
     fit = refine(start.template, start.parameters, start.translation, cloud, settings)
     distance = surface_distance(start.template, fit.parameters, fit.translation, cloud)
     if distance > DIVERGED * start.distance:
@@ -122,7 +122,7 @@ def _refined(start: Estimate, cloud: Cloud, settings: Settings, floor: Array) ->
         start,
         parameters=fit.parameters,
         translation=fit.translation,
-        sigma=np.hypot(fit.sigma, floor),
+        sigma=np.hypot(scale * fit.sigma, SIGMA_FLOOR),
         distance=distance,
     )
 

@@ -24,9 +24,9 @@ SHIPPED = Path(__file__).parent.parent / "models"
 GOLDEN_TOLERANCE = 1e-3
 STEEPNESS = 4
 """How fast a score falls with the distance."""
-SIGMA_FLOOR = 0.004
-"""Least standard deviation claimed for a refined parameter where the card says none: the repeat
-error of measuring real shapes by hand is of this size (in the normalised frame's unit)."""
+SIGMA_FLOOR = 0.002
+"""Least standard deviation claimed for a refined parameter: the repeat error of measuring real
+shapes by hand is of this size (in the normalised frame's unit)."""
 SMALLEST = 1e-3
 """Least length in the normalised frame, where the shape has radius 0.6."""
 
@@ -87,10 +87,10 @@ class Model:
         return float(self.card["calibration"]["limit_odds"])
 
     @property
-    def sigma_floor(self) -> NDArray[np.float64]:
-        """``[d]`` least standard deviations claimed for refined parameters, normalised."""
-        floors = self.card.get("calibration", {}).get("sigma_floor", {})
-        return np.array([float(floors.get(name, SIGMA_FLOOR)) for name in self.template.names])
+    def sigma_scale(self) -> NDArray[np.float64]:
+        """``[d]`` what a fit's own standard deviations are multiplied by to be honest."""
+        scales = self.card.get("calibration", {}).get("sigma_scale", {})
+        return np.array([float(scales.get(name, 1.0)) for name in self.template.names])
 
     def score(self, distance: float, odds: float) -> float:
         """How much a fitted shape is like the category's, from 1 down to 0.

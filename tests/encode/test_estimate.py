@@ -10,7 +10,7 @@ import yaml
 from service.encode import estimate as inference
 from service.encode.distance import Cloud, surface_distance
 from service.encode.estimate import DOUBT, SIGMA_ENCODER, estimate
-from service.encode.model import SMALLEST, Encoding, Model
+from service.encode.model import SIGMA_FLOOR, SMALLEST, Encoding, Model
 from service.encode.refine import Fit
 from service.mesh.surface import Samples, sample_surface
 from service.template.loader import compile_template
@@ -28,7 +28,7 @@ def test_it_measures_a_chair_in_its_normalised_frame(
     np.testing.assert_allclose(answer.parameters[:8] / scale, plain, atol=0.006)
     np.testing.assert_allclose(answer.translation, -center * scale, atol=0.006)
     assert answer.distance < 0.003
-    assert (answer.sigma >= chair_model.sigma_floor).all()
+    assert (answer.sigma >= SIGMA_FLOOR).all()
     assert (answer.sigma[:8] < SIGMA_ENCODER).all()
 
 
@@ -94,9 +94,8 @@ def test_no_claim_is_finer_than_a_hand_could_measure(
 
     monkeypatch.setattr(inference, "refine", exact)
     sigma = estimate(chair_model, chair_samples).sigma
-    floor = chair_model.sigma_floor
-    np.testing.assert_allclose(sigma[:7], floor[:7])
-    assert sigma[7] == pytest.approx(np.hypot(0.003, floor[7]))
+    np.testing.assert_allclose(sigma[:7], SIGMA_FLOOR)
+    assert sigma[7] == pytest.approx(np.hypot(0.003 * chair_model.sigma_scale[7], SIGMA_FLOOR))
 
 
 def test_fewer_samples_can_be_refined_on(chair_model: Model, chair_samples: Samples) -> None:
@@ -141,7 +140,7 @@ class Undecided:
         self.template = compile_template(yaml.safe_load(STOOLS))
         self.points = 400
         self.shares = np.array(shares)
-        self.sigma_floor = np.full(2, 0.004)
+        self.sigma_scale = np.ones(2)
 
     def samples(self, variant: int) -> Samples:
         own = self.template.variants[variant]

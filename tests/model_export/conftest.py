@@ -127,8 +127,8 @@ class MeanModel:
         return np.zeros(len(orientations))
 
     @property
-    def sigma_floor(self) -> np.ndarray:
-        return np.full(3, 0.004)
+    def sigma_scale(self) -> np.ndarray:
+        return np.ones(3)
 
     def score(self, distance: float, odds: float) -> float:
         return 1.0 / (1.0 + distance)

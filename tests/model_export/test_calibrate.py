@@ -11,12 +11,13 @@ from model_export.calibrate import (
     DRAWN_FARTHER,
     DRAWN_ODDS,
     FEWEST,
+    LEAST_SCALE,
     calibrate,
-    sigma_floors,
+    sigma_scales,
 )
 from model_export.realistic import RealisticShape, find_shapes
 from model_export.truth import Judged, Measured
-from service.encode.model import Model, load_models
+from service.encode.model import SIGMA_FLOOR, Model, load_models
 from service.mesh.frame import CANONICAL
 from service.mesh.surface import Samples, sample_surface
 from service.template.loader import load_template
@@ -77,10 +78,10 @@ def test_sigma_covers_two_thirds_of_the_errors() -> None:
         name = {"width": error}
         return Judged(shape, measured, name, name, {"width": 1.0}, {"width": fitted}, 0.02)
 
-    errors, fitted = np.abs(rng.normal(0, 2.0, 400)), rng.uniform(0.0, 0.02, 400)
+    errors, fitted = np.abs(rng.normal(0, 2.0, 400)), rng.uniform(0.01, 0.03, 400)
     judged = [answer(e, f) for e, f in zip(errors, fitted, strict=True)]
-    floor = sigma_floors(judged)["width"]
-    within = errors * 0.02 <= np.hypot(fitted, floor)
+    scale = sigma_scales(judged)["width"]
+    within = errors * 0.02 <= np.hypot(scale * fitted, SIGMA_FLOOR)
     assert within.mean() == pytest.approx(0.68, abs=0.01)
-    assert sigma_floors(judged[: FEWEST - 1]) == {}
-    assert sigma_floors([answer(0.1, 1.0)] * FEWEST) == {"width": 0.0}
+    assert sigma_scales(judged[: FEWEST - 1]) == {}
+    assert sigma_scales([answer(0.01, 1.0)] * FEWEST) == {"width": LEAST_SCALE}
