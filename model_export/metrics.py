@@ -56,10 +56,11 @@ def recovery(
     gap = predicted[:, : size + 3] - true
     active = np.stack([own.active for own in template.variants])[variant]
     odds = predicted[:, size + 3 :]
+    counted = np.maximum(active.sum(axis=0), 1)
     return Recovery(
         within=_within(template, gap, variant, np.ones_like(factors)),
         edited=_within(template, gap, variant, factors),
-        error=(active * np.abs(gap[:, :size])).sum(axis=0) / active.sum(axis=0) / spread,
+        error=(active * np.abs(gap[:, :size])).sum(axis=0) / counted / spread,
         variants=float((odds.argmax(axis=1) == variant).mean()) if odds.size else 1.0,
     )
 

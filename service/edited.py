@@ -117,7 +117,7 @@ def _report(moved: Moved, before: dict[str, float], after: dict[str, float]) -> 
 
 
 def _warnings(moved: Moved, flips: int) -> list[str]:
-    template = moved.found.model.template
+    template = moved.found.best.estimate.template
     unit, before, after = moved.found.unit, moved.found.parameters, moved.after
     reason = ", ".join(moved.outcome.limits)
     warnings = [

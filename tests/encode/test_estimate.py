@@ -128,6 +128,7 @@ parts:
   slab: {shape: box, cells: [2, 1, 2], center: [0, 0, 0], size: [width, width / 6, width]}
   post: {shape: box, cells: [1, 2, 1], center: [0, -width / 12 - height / 2, 0],
          size: [width / 5, height, width / 5], hidden: [top]}
+relations: [height - width / 2]
 variants: {high: {}, low: {without: [post]}}
 keep: {floor: [0, -height, 0]}
 """

@@ -27,6 +27,7 @@ SIX_BOXES = (
     (Path(service.template.__file__).parent / "paper_chair.yaml")
     .read_text("utf-8")
     .replace("name: paper_chair", "name: chair")
+    .replace("label: Chair of six boxes", "label: Chair")
 )
 ANSWER = [0.4, 0.04, 0.06, -0.2, 0.5, 0.4, 0.05, 0.0]
 
@@ -113,7 +114,7 @@ def test_nuisance_parameters_are_not_described(folder: Path, chair: AffineTempla
 
 
 def test_a_template_beside_the_card_is_the_categorys(folder: Path) -> None:
-    text = SIX_BOXES.replace("label: Chair of six boxes", "label: Throne")
+    text = SIX_BOXES.replace("label: Chair", "label: Throne")
     (folder / "chair.yaml").write_text(text, "utf-8")
     assert load_models(folder)["chair"].template.label == "Throne"
 
@@ -235,7 +236,7 @@ def test_the_description_names_every_parameter_and_dimension(folder: Path) -> No
 def test_the_installed_model_is_whole(chair_model: Model, chair: AffineTemplate) -> None:
     chair_model.verify()
     assert chair_model.points == chair.points == 2840
-    assert 0.02 < chair_model.limit_distance < 0.06
+    assert 0.01 < chair_model.limit_distance < 0.04
 
 
 def test_the_installed_model_tells_chairs_apart(
