@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parents[2] / "shared" / "data" / "chairs"
 ORIGINALS = sorted((FOLDER / "originals").glob("polyhaven-*/*.glb"))
 MESHES = sorted((FOLDER / "meshes").glob("*.ply"))[::24]
 POSTS = sorted(FOLDER.glob("meshes/polyhaven-woodenchair-01.ply"))
-UPRIGHT = InferOptions(up="+y", front="+z")
+UPRIGHT = InferOptions(up="+y", front="+z", category="chair")
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,8 @@ from service.mesh.surface import RADIUS
 Array = NDArray[np.float64]
 
 LEAST, MOST = np.radians(2.5), np.radians(30.0)
-"""Smaller leans are within what the signs are off by; larger ones are no slight lean."""
+"""Smaller leans, about each axis, are within what the signs are off by; larger ones are no slight
+lean."""
 RESTING = 0.02 * RADIUS
 """Points this near to the resting plane settle where it is."""
 PROBES = 600
@@ -42,9 +43,10 @@ def leans(points: Array, stands: bool) -> Iterator[Array]:
         turn = np.array([0.0, turn[1], 0.0])
     both = (Rotation.from_rotvec(turn) * Rotation.from_rotvec(level)).as_rotvec()
     tried: list[Array] = []
-    for lean in (both, level, turn):
+    for whole in (both, level, turn):
+        lean = np.where(np.abs(whole) > LEAST, whole, 0.0)
         new = all(np.linalg.norm(lean - other) > LEAST / 2 for other in tried)
-        if LEAST < np.linalg.norm(lean) < MOST and new:
+        if 0.0 < np.linalg.norm(lean) < MOST and new:
             tried.append(lean)
             yield lean
 
