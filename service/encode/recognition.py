@@ -25,7 +25,7 @@ STRAIGHTER = 1.05
 """A lean is taken out where that shortens the fit's distance to this share or less."""
 LISTED = 3
 """Readings that are told of at least, where there are so many."""
-ROUGH = Settings(iterations=8, template_points=600)
+ROUGH = Settings(iterations=8, rough=0, template_points=600)
 """Enough refinement to tell readings apart; it sees every third sample."""
 
 
@@ -86,10 +86,10 @@ def recognise(
     finalists = 1 + int(np.searchsorted(np.cumsum([v.probability for v in views]), DECIDED))
     finalists = min(finalists, FINALISTS, len(views))
     if finalists == 1:
-        listed = [view.candidate(refined=False) for view in views[:LISTED]]
+        listed = [view.candidate(False, ROUGH, 3) for view in views[:LISTED]]
     else:
         fitted = _weighed([view.candidate(True, ROUGH, 3) for view in views[:finalists]])
-        listed = [*fitted, *(view.candidate(refined=False) for view in views[finalists:LISTED])]
+        listed = [*fitted, *(view.candidate(False, ROUGH, 3) for view in views[finalists:LISTED])]
     best = straightened(listed[0])
     answer = estimate(best.model, best.samples, refined)
     return [replace(best, estimate=answer), *listed[1:]]

@@ -26,7 +26,8 @@ class Settings:
     """How a refinement goes about it; lengths are in the normalised frame (radius 0.6).
 
     Attributes:
-        iterations: Gauss-Newton steps.
+        iterations: Gauss-Newton steps,
+        rough: the first of them on one in `STRIDE` samples.
         template_points: samples on the template.
         coarse, fine: scale of the robust kernel at the first and the last step.
         normal_weight: length that a right angle between normals counts as, in matching.
@@ -34,6 +35,7 @@ class Settings:
     """
 
     iterations: int = 20
+    rough: int = 12
     template_points: int = 1600
     coarse: float = 0.30
     fine: float = 0.04
@@ -42,6 +44,8 @@ class Settings:
 
 
 STANDARD = Settings()
+STRIDE = 3
+"""At a wide kernel's scale a fraction of the samples shows the way as well."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +84,15 @@ def refine(
         The fitted parameters, sizes no smaller than `SMALLEST`.
     """
     start = np.concatenate([parameters, translation])
-    moving = MovingSamples(template, parameters, settings.template_points)
-    matcher = Matcher(cloud, settings.normal_weight)
     spread = np.concatenate([np.full(len(parameters), 0.1), np.full(3, 0.1)])
     state = start.copy()
     scales = np.geomspace(settings.coarse, settings.fine, settings.iterations)
-    for scale in scales:
+    rough = min(settings.rough, settings.iterations)
+    moving, matcher = _sampled(template, state, cloud, settings, STRIDE if rough else 1)
+    for index, scale in enumerate(scales):
         deadline.check()
+        if index == rough > 0:
+            moving, matcher = _sampled(template, state, cloud, settings, 1)
         system = normal_equations(moving, matcher, state, scale)
         prior = settings.pull / spread**2
         hessian = system.hessian + np.diag(prior)
@@ -99,6 +105,15 @@ def refine(
     sigma = np.sqrt(np.diag(covariance) * system.cost / SIGMA_SAMPLES)
     d = len(parameters)
     return Fit(state[:d], state[d:], sigma[:d], system.cost)
+
+
+def _sampled(
+    template: AffineTemplate, state: Array, cloud: Cloud, settings: Settings, stride: int
+) -> tuple[MovingSamples, Matcher]:
+    """Samples of the template at a state and of the upload, one in so many."""
+    count = settings.template_points // stride
+    moving = MovingSamples(template, state[:-3], count)
+    return moving, Matcher(cloud, settings.normal_weight, stride)
 
 
 def _admissible(template: AffineTemplate, parameters: Array) -> Array:

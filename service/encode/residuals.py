@@ -90,16 +90,17 @@ def _shifted(jacobian: Array) -> Array:
 class Matcher:
     """The upload's samples, to be paired with the template's."""
 
-    def __init__(self, cloud: Cloud, normal_weight: float) -> None:
+    def __init__(self, cloud: Cloud, normal_weight: float, stride: int = 1) -> None:
         """
         Args:
             cloud: the upload's samples.
             normal_weight: length that a right angle between normals counts as.
+            stride: one in so many samples is paired.
         """
-        self.points = cloud.points
+        self.points = cloud.points[::stride]
         self.extents = np.stack([cloud.points.min(axis=0), cloud.points.max(axis=0)])
         self.weight = normal_weight
-        self.features = np.hstack([cloud.points, normal_weight * cloud.normals])
+        self.features = np.hstack([self.points, normal_weight * cloud.normals[::stride]])
         self.tree = _tree(self.features)
 
     def pairs(self, points: Array, normals: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -210,3 +210,16 @@ def test_a_strong_pull_holds_the_start(
     cloud, f, t = labelled(plain)
     held = refine(chair, 1.1 * f, t, cloud, Settings(pull=10.0))
     np.testing.assert_allclose(held.parameters, 1.1 * f, atol=1e-3)
+
+
+def test_a_rough_beginning_ends_where_a_whole_one_does(
+    chair: AffineTemplate, plain: np.ndarray, labelled: Any
+) -> None:
+    cloud, f, t = labelled(plain, noise=0.002)
+    start = 1.08 * f, t + 0.02
+    whole = refine(chair, *start, cloud, Settings(rough=0))
+    swift = refine(chair, *start, cloud)
+    np.testing.assert_allclose(swift.parameters, whole.parameters, atol=0.003)
+    assert not np.array_equal(swift.parameters, whole.parameters)
+    all_rough = refine(chair, *start, cloud, Settings(rough=20))
+    np.testing.assert_allclose(all_rough.parameters, whole.parameters, atol=0.01)
