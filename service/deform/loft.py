@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from service.deform.binding import FLOOR
 from service.template.affine import AffineTemplate
 from service.template.frames import Frames
+from service.template.unitshape import rings
 
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
@@ -141,12 +142,9 @@ def _is_box(u: Array, run: int) -> bool:
 
 def _outline(u: Array, run: int, start: float) -> Outline:
     """Of a unit shape's vertices ``u [n, 3]``, from ``start`` on."""
-    across = np.delete(u, run, axis=1)
-    levels, ring = np.unique(np.round(u[:, run], 6), return_inverse=True)
-    low, high = np.full((len(levels), 2), np.inf), np.full((len(levels), 2), -np.inf)
-    np.minimum.at(low, ring, across)
-    np.maximum.at(high, ring, across)
-    return Outline((levels - start) / (0.5 - start) - 0.5, (low + high) / 2, (high - low) / 2)
+    found = rings(u, run)
+    levels = (found.levels - start) / (0.5 - start) - 0.5
+    return Outline(levels, (found.low + found.high) / 2, (found.high - found.low) / 2)
 
 
 def _beyond_box(offset: Array32, half: Array32) -> Array32:

@@ -76,7 +76,9 @@ class AffineTemplate:
     def variants(self) -> tuple[AffineTemplate, ...]:
         """The template of each variant, with its own parts only: what a shape is fitted by.
 
-        XX"""
+        They share the parameters; one that moves none of a variant's parts is idle there, and
+        relations with it do not hold.
+        """
         if not self.present:
             return (self,)
         return tuple(self._restricted(name, has) for name, has in self.present.items())
@@ -84,12 +86,8 @@ class AffineTemplate:
     def _restricted(self, name: str, has: NDArray[np.bool_]) -> AffineTemplate:
         own_vertex, own_face = has[self.part], has[self.part[self.faces[:, 0]]]
         vertex, part = np.cumsum(own_vertex) - 1, np.cumsum(has) - 1
-        idle = ~self.jacobian[own_vertex].any(axis=(0, 1))
-        held = ~(self.relations[:, 1:][:, idle] != 0.0).any(axis=1)
-        return replace(
+        own = replace(
             self,
-            relations=self.relations[held],
-            relation_texts=tuple(compress(self.relation_texts, held.tolist())),
             base=self.base[own_vertex],
             jacobian=self.jacobian[own_vertex],
             faces=vertex[self.faces[own_face]],
@@ -103,6 +101,12 @@ class AffineTemplate:
             run=self.run[has],
             present={},
             variant=name,
+        )
+        held = ~(self.relations[:, 1:][:, ~own.active] != 0.0).any(axis=1)
+        return replace(
+            own,
+            relations=self.relations[held],
+            relation_texts=tuple(compress(self.relation_texts, held.tolist())),
         )
 
     @property

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.template.expressions import parse_affine, parse_rows
+from service.template.unitshape import rings
 
 Array = NDArray[np.float64]
 
@@ -66,11 +67,8 @@ def _shares(s: Array, at: Array) -> Array:
 
 def _outline(unit: Array, run: int) -> Array:
     """``[n, 2]`` places on the sections, each from -1/2 to 1/2 across; 0 where it is a point."""
-    across = np.delete(unit, run, axis=1)
-    _, ring = np.unique(np.round(unit[:, run], 9), return_inverse=True)
-    low, high = np.full((ring.max() + 1, 2), np.inf), np.full((ring.max() + 1, 2), -np.inf)
-    np.minimum.at(low, ring, across)
-    np.maximum.at(high, ring, across)
-    size = (high - low)[ring]
-    outline: Array = (across - ((low + high) / 2)[ring]) / np.where(size > 1e-9, size, np.inf)
+    found = rings(unit, run)
+    size = (found.high - found.low)[found.of]
+    offset = np.delete(unit, run, axis=1) - ((found.low + found.high) / 2)[found.of]
+    outline: Array = offset / np.where(size > 1e-9, size, np.inf)
     return outline

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from service.template.panel import panel
-from service.template.unitshape import UnitShape
+from service.template.unitshape import UnitShape, rings
 
 ORDERS = ("xyz", "yzx", "zxy", "yxz", "zyx", "xzy")
 
@@ -37,3 +37,12 @@ def test_turned_shapes_keep_their_volume_and_look_outwards(axes: str) -> None:
     volumes = [trimesh.Trimesh(s.vertices, s.faces).volume for s in (shape, turned)]
     assert volumes[1] == pytest.approx(volumes[0])
     assert volumes[0] > 0.5
+
+
+def test_rings_are_the_sections_across_the_run() -> None:
+    points = np.array([[1.0, 0.0, 2.0], [3.0, 0.5, 4.0], [5.0, 0.0, -2.0]])
+    found = rings(points, 1)
+    assert found.levels.tolist() == [0.0, 0.5]
+    assert found.of.tolist() == [0, 1, 0]
+    assert found.low.tolist() == [[1.0, -2.0], [3.0, 4.0]]
+    assert found.high.tolist() == [[5.0, 2.0], [3.0, 4.0]]
