@@ -9,7 +9,7 @@ import numpy as np
 
 from service.encode.estimate import Estimate, estimate
 from service.encode.model import STEEPNESS, Model
-from service.encode.refine import STANDARD, Settings
+from service.encode.refine import Settings
 from service.encode.straighten import leans
 from service.mesh.frame import CANONICAL, Orientation
 from service.mesh.surface import Normalization, Samples
@@ -22,7 +22,7 @@ DECIDED = 0.97
 FINALISTS = 4
 """but no more than these."""
 STRAIGHTER = 1.05
-"""A lean is taken out where that shortens the fit's distance to this share or less."""
+"""A lean is taken out where the fit's distance is then at most so many times as long."""
 LISTED = 3
 """Readings that are told of at least, where there are so many."""
 ROUGH = Settings(iterations=8, rough=0, template_points=600)
@@ -86,30 +86,35 @@ def recognise(
     finalists = 1 + int(np.searchsorted(np.cumsum([v.probability for v in views]), DECIDED))
     finalists = min(finalists, FINALISTS, len(views))
     if finalists == 1:
-        listed = [view.candidate(False, ROUGH, 3) for view in views[:LISTED]]
+        listed = [view.candidate(refined=False) for view in views[:LISTED]]
     else:
-        fitted = _weighed([view.candidate(True, ROUGH, 3) for view in views[:finalists]])
-        listed = [*fitted, *(view.candidate(False, ROUGH, 3) for view in views[finalists:LISTED])]
+        fitted = _weighed([view.candidate(refined=True) for view in views[:finalists]])
+        listed = [*fitted, *(view.candidate(refined=False) for view in views[finalists:LISTED])]
     best = straightened(listed[0])
     answer = estimate(best.model, best.samples, refined)
     return [replace(best, estimate=answer), *listed[1:]]
 
 
 def straightened(candidate: Candidate) -> Candidate:
-    """The candidate without its lean, if it has one and fits clearly better without."""
+    """The candidate without its lean, if it has one and fits about as well or better without."""
     model, samples = candidate.model, candidate.samples
     points = Normalization.of(samples.points).apply(samples.points)
     best, least = candidate, np.inf
     for lean in leans(points, model.template.stands):
         if not np.isfinite(least):
-            least = STRAIGHTER * estimate(model, samples, True, ROUGH, stride=3).distance
+            least = STRAIGHTER * _rough(model, samples).distance
         turn = CANONICAL.leaning(lean)
         own = turned(samples, turn)
-        fit = estimate(model, own, True, ROUGH, stride=3)
+        fit = _rough(model, own)
         if fit.distance < least:
             orientation = candidate.orientation.leaning(lean)
             best, least = replace(candidate, orientation=orientation, samples=own), fit.distance
     return best
+
+
+def _rough(model: Model, samples: Samples, refined: bool = True) -> Estimate:
+    """An estimate that is good enough to tell readings apart."""
+    return estimate(model, samples, refined, ROUGH, stride=3)
 
 
 @dataclass(frozen=True)
@@ -122,9 +127,9 @@ class _View:
     odds: float
     probability: float
 
-    def candidate(self, refined: bool, settings: Settings = STANDARD, stride: int = 1) -> Candidate:
+    def candidate(self, refined: bool) -> Candidate:
         own = turned(self.samples, self.orientation)
-        fit = estimate(self.model, own, refined, settings, stride)
+        fit = _rough(self.model, own, refined)
         return Candidate(self.model, self.orientation, own, self.odds, self.probability, fit)
 
 

@@ -46,6 +46,10 @@ class Settings:
 STANDARD = Settings()
 STRIDE = 3
 """At a wide kernel's scale a fraction of the samples shows the way as well."""
+SPREAD = 0.1
+"""How far off the encoder's answer the pull expects the fit to end."""
+SIGMA_SAMPLES = 40
+"""Independent measurements that the correlated residuals of a fit are worth."""
 
 
 @dataclass(frozen=True)
@@ -84,24 +88,22 @@ def refine(
         The fitted parameters, sizes no smaller than `SMALLEST`.
     """
     start = np.concatenate([parameters, translation])
-    spread = np.concatenate([np.full(len(parameters), 0.1), np.full(3, 0.1)])
+    prior = np.full(len(start), settings.pull / SPREAD**2)
     state = start.copy()
     scales = np.geomspace(settings.coarse, settings.fine, settings.iterations)
-    rough = min(settings.rough, settings.iterations)
-    moving, matcher = _sampled(template, state, cloud, settings, STRIDE if rough else 1)
-    for index, scale in enumerate(scales):
-        deadline.check()
-        if index == rough > 0:
-            moving, matcher = _sampled(template, state, cloud, settings, 1)
-        system = normal_equations(moving, matcher, state, scale)
-        prior = settings.pull / spread**2
-        hessian = system.hessian + np.diag(prior)
-        damped = hessian + 1e-4 * np.diag(np.diag(hessian)) + 1e-9 * np.eye(len(state))
-        step = np.linalg.solve(damped, -system.gradient + prior * (start - state))
-        state = state + np.clip(step, -0.15, 0.15)
-        state[: len(parameters)] = _admissible(template, state[: len(parameters)])
+    stages = [(STRIDE, scales[: settings.rough]), (1, scales[settings.rough :])]
+    for stride, own in stages if settings.rough else stages[1:]:
+        moving, matcher = _sampled(template, state, cloud, settings, stride)
+        for scale in own:
+            deadline.check()
+            system = normal_equations(moving, matcher, state, scale)
+            hessian = system.hessian + np.diag(prior)
+            damped = hessian + 1e-4 * np.diag(np.diag(hessian)) + 1e-9 * np.eye(len(state))
+            step = np.linalg.solve(damped, -system.gradient + prior * (start - state))
+            state = state + np.clip(step, -0.15, 0.15)
+            state[: len(parameters)] = _admissible(template, state[: len(parameters)])
     system = normal_equations(moving, matcher, state, settings.fine)
-    covariance = np.linalg.inv(system.hessian + np.diag(settings.pull / spread**2))
+    covariance = np.linalg.inv(system.hessian + np.diag(prior))
     sigma = np.sqrt(np.diag(covariance) * system.cost / SIGMA_SAMPLES)
     d = len(parameters)
     return Fit(state[:d], state[d:], sigma[:d], system.cost)
@@ -123,7 +125,3 @@ def _admissible(template: AffineTemplate, parameters: Array) -> Array:
         if lack > 0.0:
             parameters = parameters + np.array(row) * (lack / np.dot(row, row))
     return positive(template, parameters)
-
-
-SIGMA_SAMPLES = 40
-"""Independent measurements that the correlated residuals of a fit are worth."""
