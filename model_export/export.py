@@ -24,7 +24,7 @@ from model_export.refit import refit
 from model_export.report import write_report
 from model_export.samples import clouds_of
 from model_export.train import template_copy
-from model_export.truth import judge, read_truth, summary
+from model_export.truth import judge, read_truth, rescaled, summary
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
 from service.encode.model import Model, file_digest, golden_cloud
 from service.encode.session import EncoderSession
@@ -213,10 +213,10 @@ def main() -> None:
         held_out = [shape for shape in shapes if shape.held_out]
         card["metrics"]["realistic"] = real_fits(model, held_out)
     if arguments.realistic and arguments.truth:
-        truth = read_truth(arguments.truth)
-        scales = sigma_scales(judge(model, arguments.realistic, truth))
+        judged = judge(model, arguments.realistic, read_truth(arguments.truth))
+        scales = sigma_scales(judged)
         card["calibration"]["sigma_scale"] = scales
-        card["metrics"]["truth"] = summary(judge(model, arguments.realistic, truth))
+        card["metrics"]["truth"] = summary(rescaled(judged, scales))
     if arguments.ablation:
         card["metrics"]["ablation"] = json.loads(arguments.ablation.read_text("utf-8"))
     card_path = path.with_suffix(".json")

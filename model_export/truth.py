@@ -125,12 +125,25 @@ def _judged(model: Model, shape: RealisticShape, measured: Measured) -> Judged:
         {n: measured.gap(n, v) for n, v in _dimensions(found, f).items() if n in measured.readings}
         for f in (encoded, found.fit.parameters)
     )
-    claimed = 100 * sigma / normalization.scale / measured.size
-    claims = dict(zip(model.template.names, claimed.tolist(), strict=True))
     alone = np.sqrt(np.maximum(sigma**2 - SIGMA_FLOOR**2, 0.0)) / model.sigma_scale
     fitted = dict(zip(model.template.names, alone.tolist(), strict=True))
     unit = 0.01 * measured.size * normalization.scale
+    claims = dict(zip(model.template.names, (sigma / unit).tolist(), strict=True))
     return Judged(shape, measured, encoder, refined, claims, fitted, unit)
+
+
+def rescaled(judged: Sequence[Judged], scales: Mapping[str, float]) -> list[Judged]:
+    """The same answers, as claimed by a model whose card has these `sigma_scale`s."""
+    return [
+        replace(
+            entry,
+            sigma={
+                name: float(np.hypot(scales.get(name, 1.0) * fitted, SIGMA_FLOOR)) / entry.unit
+                for name, fitted in entry.fitted_sigma.items()
+            },
+        )
+        for entry in judged
+    ]
 
 
 def _dimensions(found: Inferred, f: Array) -> dict[str, float]:

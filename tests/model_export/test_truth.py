@@ -11,6 +11,7 @@ from model_export import truth
 from model_export.realistic import RealisticShape, find_shapes
 from model_export.samples import infer_shape
 from model_export.truth import Judged, Measured
+from service.encode.model import SIGMA_FLOOR
 
 # A chair 2 m high, so that a centimetre is half a percent.
 CHAIR: dict[str, Any] = {
@@ -116,3 +117,12 @@ def test_the_worst_are_drawn(mean_model: Any, meshes: Path, tmp_path: Path,
     entries = [judged("bar", {"w": value, "h": 0.2}) for value in (0.5, 4.0, 1.5)]
     truth.save_worst(mean_model, entries, tmp_path / "worst.png", count=2)
     assert [title.splitlines()[1] for title in titles] == ["w off by 4.0 %", "w off by 1.5 %"]
+
+
+def test_claims_follow_from_the_fits_and_a_cards_scales() -> None:
+    shape, measured = RealisticShape("a", Path("a.ply"), False, {}), Measured("a", "all", 1.0, {})
+    sigma, fitted = {"width": 9.0, "height": 9.0}, {"width": 0.01, "height": 0.02}
+    (entry,) = truth.rescaled([Judged(shape, measured, {}, {}, sigma, fitted, 0.01)], {"width": 3})
+    assert entry.sigma["width"] == pytest.approx(np.hypot(3.0, 100 * SIGMA_FLOOR))
+    assert entry.sigma["height"] == pytest.approx(np.hypot(2.0, 100 * SIGMA_FLOOR))
+    assert entry.fitted_sigma == fitted
