@@ -435,8 +435,8 @@ def test_an_edit_that_makes_parts_collide_stops_at_the_nearest_and_says_so(
     edited = change(Upload(chair_glb, "chair.glb"), models, '{"leg_width": 0.3}')
     (warning,) = edited.report["warnings"]
     width = values_of(found)["seat_width"]
-    # Less by how far the legs stand inward, which is next to nothing.
-    assert edited.parameters["leg_width"] == pytest.approx(0.4 * width, rel=0.01)
+    inset = found.parameters[found.model.template.names.index("leg_inset")]
+    assert edited.parameters["leg_width"] == pytest.approx(0.4 * width - inset)
     assert "not 0.3: the nearest that keeps 0.8 * seat_width - 2 * leg_width - 2" in warning
     assert np.isfinite(vertices_of(edited)).all()
 

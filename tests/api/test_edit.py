@@ -288,7 +288,7 @@ def test_an_edit_too_far_is_the_nearest_or_when_strict_refused(
         )
 
     near = json.loads(send().headers["shape-parameters"])
-    assert near["leg_width"] == pytest.approx(0.4 * near["seat_width"], rel=0.01)
+    assert near["leg_width"] == pytest.approx(0.4 * near["seat_width"], rel=0.005)
     document = problem(send(strict="true"), 422, "edit_out_of_bounds")
     assert "0.8 * seat_width - 2 * leg_width - 2 * leg_inset >= 0" in document.detail
     assert f"{near['leg_width']:.4g}" in document.suggestion

@@ -47,7 +47,7 @@ def test_a_chair_is_found_whichever_way_it_faces(
     found = list(answers(model, shape, (1.0, 1000.0)))
     assert [answer.way for answer in found] == [way for way in ways for _ in range(2)]
     assert all(answer.right and answer.up and not answer.refused for answer in found)
-    assert all(answer.gap < 0.01 for answer in found)
+    assert all(answer.gap < 1e-4 for answer in found)
 
 
 def test_another_orientation_than_the_shapes_own_is_wrong(
