@@ -19,7 +19,7 @@ from service.mesh.surface import RADIUS, sample_surface
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 CLOUD_SIZE = 8192
-GROUPS = ("near_dup_group", "family", "group")
+GROUPS = ("near_dup_group", "family", "group", "character")
 """Entries of a manifest that shapes too much alike to be on both sides of the split share."""
 
 

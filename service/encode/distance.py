@@ -40,10 +40,14 @@ def surface_distance(
         parameters, translation: ``[d]``, ``[3]`` of the fit.
         cloud: the upload.
     """
-    points = cloud.points
     visible = template.faces[~template.hidden]
-    vertices = template.decode(parameters) + translation
-    samples = sample_surface(vertices, visible, len(points), np.random.default_rng(1))
+    return mesh_distance(template.decode(parameters) + translation, visible, cloud)
+
+
+def mesh_distance(vertices: Array, faces: NDArray[np.int64], cloud: Cloud) -> float:
+    """`surface_distance` of a fitted mesh, ``vertices [V, 3]`` and ``faces [F, 3]``."""
+    points = cloud.points
+    samples = sample_surface(vertices, faces, len(points), np.random.default_rng(1))
     there = _one_way(samples.points, points, cloud.normals)
     back = _one_way(points, samples.points, samples.normals)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))

@@ -1,0 +1,167 @@
+"""From samples of an upload to a body: turn, encode, refine, judge."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from service.encode.bodyfit import ROUGH, STANDARD, Anchor, BodySettings, fit_body, posed_by
+from service.encode.bodyoutputs import BodyEncoding
+from service.encode.bodysamples import COUNT, LOG_SCALE, SHAPE, BodySamples
+from service.encode.distance import Cloud, mesh_distance
+from service.mesh.frame import Orientation, orientations
+from service.mesh.surface import Normalization, Samples
+from service.template.skinned import SHAPES, Body, SkinnedTemplate
+
+Array = NDArray[np.float64]
+
+READINGS = 4
+"""Orientations that are tried at most,"""
+DOUBT = 5.0
+"""with log odds no farther than this below the likeliest's."""
+STEEPNESS = 8
+"""How fast a reading's worth falls with its distance."""
+PROBES = 600
+"""Points by which normals are compared."""
+OPPOSED = -0.3
+"""A cloud whose normals agree with the body's no better than this, on the mean, is inside out."""
+PLAUSIBLE = (0.72, 1.4)
+"""The file's unit is believed where a metre is so many times as long as the encoder thinks."""
+SIGMA_FLOOR = 0.01
+"""Least standard deviation claimed for a refined parameter, in radians and likewise for shape."""
+SIGMA_ENCODER = 0.25
+"""Claimed for the encoder alone."""
+
+
+class Compass(Protocol):
+    """Tells which way a cloud is turned; see `service.encode.discriminator`."""
+
+    def odds(self, cloud: Array, orientations: Sequence[Orientation]) -> Array:
+        """Log odds ``[k]`` of each orientation of a cloud ``[n, 3]``."""
+
+
+class BodyEncoder(Protocol):
+    """What is asked of a model."""
+
+    @property
+    def template(self) -> SkinnedTemplate:
+        """The body."""
+
+    @property
+    def discriminator(self) -> Compass:
+        """Tells which way a cloud is turned."""
+
+    def encode(self, points: Array) -> BodyEncoding:
+        """The answer for a normalised cloud ``[points, 3]``."""
+
+
+@dataclass(frozen=True)
+class BodyEstimate:
+    """A body in its normalised canonical frame.
+
+    Attributes:
+        body: its scale is the normalised length of a metre of the template.
+        sigma: ``[75]`` standard deviations of its parameters.
+        distance: `surface_distance` of the fit.
+        encoder_distance: the same for the encoder's answer alone.
+        normalization: from the canonical frame.
+        inside_out: the upload's faces are wound the wrong way round, as a mirrored mesh's are.
+    """
+
+    body: Body
+    sigma: Array
+    distance: float
+    encoder_distance: float
+    normalization: Normalization
+    inside_out: bool
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """The encoder's answer for one way of turning the cloud."""
+
+    anchor: Anchor
+    worth: float
+
+
+def estimate_body(
+    model: BodyEncoder,
+    samples: Samples,
+    refined: bool,
+    rough: bool = False,
+    metre: float | None = None,
+    settings: BodySettings = STANDARD,
+) -> BodyEstimate:
+    """Infer a body that may face, lie or stand on its head any way.
+
+    Args:
+        model: the category.
+        samples: `model.points` samples in canonical orientation, any scale and place.
+        refined: go on from the encoder's answer by refinement.
+        rough: only as well as is needed to tell readings apart.
+        metre: its length in the unit of the samples, if the file tells; it is believed if the body
+            then has a usual size.
+        settings: of the refinement.
+    """
+    normalization = Normalization.of(samples.points)
+    cloud = Cloud(normalization.apply(samples.points), samples.normals)
+    reading, inside_out = _best_reading(model, samples, cloud)
+    anchor = reading.anchor
+    if inside_out:
+        cloud = Cloud(cloud.points, -cloud.normals)
+    if metre is not None:
+        known = normalization.scale * metre
+        if PLAUSIBLE[0] < known / anchor.body.scale < PLAUSIBLE[1]:
+            anchor = replace(anchor, log_scale=float(np.log(known)))
+    template = model.template
+    start = posed_by(template, anchor)
+    distance = mesh_distance(template.decode(start), template.faces, cloud)
+    sigma = np.full(3 * COUNT + SHAPES, SIGMA_ENCODER)
+    if not refined:
+        return BodyEstimate(start, sigma, distance, distance, normalization, inside_out)
+    fit = fit_body(template, replace(anchor, body=start), cloud, ROUGH if rough else settings)
+    final = mesh_distance(template.decode(fit.body), template.faces, cloud)
+    spread = np.sqrt(np.diag(fit.covariance))[:LOG_SCALE]
+    spread[SHAPE] = np.maximum(spread[SHAPE], SIGMA_FLOOR)
+    return BodyEstimate(
+        fit.body, np.hypot(spread, SIGMA_FLOOR), final, distance, normalization, inside_out
+    )
+
+
+def _best_reading(model: BodyEncoder, samples: Samples, cloud: Cloud) -> tuple[_Reading, bool]:
+    """The orientation whose rough fit is best, and whether the faces are inside out."""
+    ways = orientations()
+    odds = model.discriminator.odds(samples.points, ways)
+    order = np.argsort(-odds, kind="stable")[:READINGS]
+    tried = [index for index in order if odds[index] > odds[order[0]] - DOUBT]
+    anchors = []
+    for index in tried:
+        way = ways[index]
+        encoding = model.encode(way.to_canonical(cloud.points)).turned(way.rotation.T)
+        body = encoding.body(model.template)
+        anchors.append(Anchor(encoding.joints, body))
+    starts = [posed_by(model.template, anchor) for anchor in anchors]
+    inside_out = opposes(model.template, starts[0], cloud)
+    if len(anchors) == 1:
+        return _Reading(anchors[0], 1.0), inside_out
+    facing = Cloud(cloud.points, -cloud.normals) if inside_out else cloud
+    readings = []
+    for index, anchor, start in zip(tried, anchors, starts, strict=True):
+        fit = fit_body(model.template, replace(anchor, body=start), facing, ROUGH)
+        distance = mesh_distance(model.template.decode(fit.body), model.template.faces, facing)
+        readings.append(_Reading(anchor, float(odds[index]) - STEEPNESS * np.log(distance)))
+    return max(readings, key=lambda reading: reading.worth), inside_out
+
+
+def opposes(template: SkinnedTemplate, body: Body, cloud: Cloud) -> bool:
+    """Whether a cloud's normals point into the body."""
+    points, normals = BodySamples(template, PROBES).at(body)
+    step = max(1, len(cloud.points) // PROBES)
+    nearest = cKDTree(points).query(cloud.points[::step])[1]
+    cosine = np.einsum("nc,nc->n", normals[nearest], cloud.normals[::step])
+    return float(cosine.mean()) < OPPOSED
