@@ -12,7 +12,7 @@ import json
 import logging
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from torch import Tensor
 from torch.nn import functional
 from tqdm import tqdm
 
+from model_export.bodies import Garments, SyntheticBodies
 from model_export.calibrate import calibrate
 from model_export.config import SHIPPED
 from model_export.distractors import heaps, other_shapes
@@ -37,6 +38,7 @@ from service.mesh.frame import orientations
 from service.mesh.surface import Samples
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
+from service.template.skinned import SkinnedTemplate
 
 POINTS = 512
 """Points that the network looks at."""
@@ -44,7 +46,10 @@ POOL = 4096
 """Points that these are drawn from, a shape."""
 SHAPES, TURNS, OTHERS = 16, 8, 48
 """Of a batch: shapes of the category, orientations of each (the first is right), other shapes."""
-REAL_SHARE = 0.7
+REAL_SHARE, BODY_REAL_SHARE = 0.7, 0.3
+"""Share of real shapes among a category's; real bodies come in few poses."""
+LEAN = math.radians(30.0)
+"""How far bodies may lean whose orientation is still the right one of the 24."""
 HEAPS = 600
 ROTATIONS = torch.tensor(np.stack([way.rotation for way in orientations()]), dtype=torch.float32)
 """``[24, 3, 3]``; the first leaves a cloud as it is."""
@@ -78,28 +83,40 @@ class Clouds:
     """What a discriminator learns from.
 
     Attributes:
-        template: the category's.
+        draw: gives so many synthetic clouds of the category, upright, of so many points.
         real: ``[R, n, 3]`` upright shapes of the category; may be none.
         others: ``[O, n, 3]`` shapes of any other kind, in any orientation.
+        real_share: share of real shapes among those of the category, if there are any.
     """
 
-    template: AffineTemplate
+    draw: Callable[[int, int], Tensor]
     real: Tensor
     others: Tensor
+    real_share: float = REAL_SHARE
+
+
+def drawn_from(
+    template: AffineTemplate | SkinnedTemplate, seed: int
+) -> Callable[[int, int], Tensor]:
+    """A source of synthetic clouds ``[count, points, 3]`` of a category, upright or nearly so."""
+    if isinstance(template, SkinnedTemplate):
+        bodies = SyntheticBodies(template, Garments(tilt=0.3, turn=LEAN), seed)
+        return lambda count, points: bodies.batch(count, points).points
+    shapes = SyntheticShapes(template, Augmentation(clutter=0.3), seed, 0.25)
+    return lambda count, points: shapes.batch(count, points).points
 
 
 def train(clouds: Clouds, steps: int, seed: int = 0) -> Discriminator:
     """Train a discriminator on the CPU."""
     torch.manual_seed(seed)
     generator = torch.Generator().manual_seed(seed)
-    synthetic = SyntheticShapes(clouds.template, Augmentation(clutter=0.3), seed, 0.25)
     network = Discriminator().train()
     optimizer = torch.optim.AdamW(network.parameters(), 2e-3, weight_decay=1e-3)
     bar = tqdm(range(steps), unit="step", mininterval=2.0)
     for step in bar:
         for group in optimizer.param_groups:
             group["lr"] = 2e-3 * (0.5 * (1 + math.cos(math.pi * step / steps)) + 1e-3)
-        own, other = _batch(clouds, synthetic, generator)
+        own, other = _batch(clouds, generator)
         with torch.autocast("cpu", torch.bfloat16):
             odds = network(torch.cat([own.flatten(0, 1), other]))
         loss = _loss(odds[: SHAPES * TURNS].reshape(SHAPES, TURNS), odds[SHAPES * TURNS :])
@@ -124,12 +141,10 @@ def _loss(own: Tensor, other: Tensor) -> Tensor:
     return choice + right + wrong
 
 
-def _batch(
-    clouds: Clouds, synthetic: SyntheticShapes, generator: torch.Generator
-) -> tuple[Tensor, Tensor]:
+def _batch(clouds: Clouds, generator: torch.Generator) -> tuple[Tensor, Tensor]:
     """``[SHAPES, TURNS, POINTS, 3]`` of the category and ``[OTHERS, POINTS, 3]`` others."""
-    real = round(SHAPES * REAL_SHARE) if len(clouds.real) else 0
-    upright = synthetic.batch(SHAPES - real, POINTS).points
+    real = round(SHAPES * clouds.real_share) if len(clouds.real) else 0
+    upright = clouds.draw(SHAPES - real, POINTS)
     if real:
         upright = torch.cat([upright, _draw(clouds.real, real, generator)])
     upright = disturb(upright, generator)
@@ -202,7 +217,7 @@ def measure(
 
 
 def build(
-    template: AffineTemplate, data: Data, steps: int, path: Path, cache: Path
+    template: AffineTemplate | SkinnedTemplate, data: Data, steps: int, path: Path, cache: Path
 ) -> dict[str, Any]:
     """Train a category's discriminator and write it.
 
@@ -219,7 +234,8 @@ def build(
     learn = [shape for shape in data.shapes if not shape.held_out]
     others = [*heaps(HEAPS, POOL, 0), *data.others(POOL, held_out=False)]
     real, strange = clouds_of(learn, cache, POOL), [samples.points for samples in others]
-    network = train(Clouds(template, pool(real), pool(strange)), steps)
+    share = BODY_REAL_SHARE if isinstance(template, SkinnedTemplate) else REAL_SHARE
+    network = train(Clouds(drawn_from(template, 0), pool(real), pool(strange), share), steps)
     write_onnx(network, path)
     return {
         "digest": file_digest(path),

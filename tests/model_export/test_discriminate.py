@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 import torch
 
-from model_export.discriminate import POINTS, ROTATIONS, Clouds, Data, pool, train, write_onnx
+from model_export.discriminate import (
+    POINTS,
+    ROTATIONS,
+    Clouds,
+    Data,
+    drawn_from,
+    pool,
+    train,
+    write_onnx,
+)
 from model_export.distractors import heaps
 from model_export.networks import Discriminator
 from model_export.synthetic import Augmentation, SyntheticShapes
@@ -21,7 +30,7 @@ STEPS = 25
 def trained(stand: AffineTemplate) -> Discriminator:
     """Trained for a moment on stands and heaps."""
     others = pool([samples.points for samples in heaps(30, 600, 0)])
-    return train(Clouds(stand, pool([]), others), STEPS)
+    return train(Clouds(drawn_from(stand, 0), pool([]), others), STEPS)
 
 
 def test_the_first_rotation_leaves_a_cloud_as_it_is() -> None:
