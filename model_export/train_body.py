@@ -48,7 +48,7 @@ class BodyConfig:
         seed: of everything random.
     """
 
-    steps: int = 9000
+    steps: int = 4800
     batch: int = 32
     real_share: float = 0.125
     points: int = 1024

@@ -160,7 +160,7 @@ def _best_reading(model: BodyEncoder, samples: Samples, cloud: Cloud) -> tuple[_
 
 def opposes(template: SkinnedTemplate, body: Body, cloud: Cloud) -> bool:
     """Whether a cloud's normals point into the body."""
-    points, normals = BodySamples(template, PROBES).at(body)
+    points, normals = BodySamples.drawn(template, PROBES).at(body)
     step = max(1, len(cloud.points) // PROBES)
     nearest = cKDTree(points).query(cloud.points[::step])[1]
     cosine = np.einsum("nc,nc->n", normals[nearest], cloud.normals[::step])

@@ -140,7 +140,7 @@ class _System:
 
 def posed_by(template: SkinnedTemplate, anchor: Anchor, settings: BodySettings = STANDARD) -> Body:
     """A body whose joints and rotations agree as well as they can with the encoder's."""
-    samples = BodySamples(template, 1)
+    samples = BodySamples.drawn(template, 1)
     body = anchor.body
     for _ in range(6):
         line = samples.linearise(body)
@@ -163,7 +163,7 @@ def fit_body(
     """
     body = anchor.body
     for stage in settings.stages:
-        samples = BodySamples(template, stage.places)
+        samples = BodySamples.drawn(template, stage.places)
         points, normals = cloud.points[:: stage.stride], cloud.normals[:: stage.stride]
         features = np.hstack([points, settings.normal_weight * normals])
         tree = cKDTree(features, balanced_tree=False, compact_nodes=False)

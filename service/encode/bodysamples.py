@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from service.mesh.surface import sample_surface
 from service.template.anatomy import JOINTS, PARENTS, descendants
@@ -46,20 +47,44 @@ class Linearisation:
 class BodySamples:
     """Fixed places on the template's surface."""
 
-    def __init__(self, template: SkinnedTemplate, count: int, seed: int = 0) -> None:
-        """``count`` places, drawn by area at rest."""
-        samples = sample_surface(template.rest, template.faces, count, np.random.default_rng(seed))
-        corners, share = template.faces[samples.faces], samples.barycentric
+    def __init__(
+        self, template: SkinnedTemplate, rest: Array, normals: Array, mix: sparse.csr_array
+    ) -> None:
+        """
+        Args:
+            template: the body.
+            rest, normals: ``[n, 3]`` of the places at rest.
+            mix: ``[n, V]`` which of the template's vertices each is a mean of.
+        """
         self.template = template
-        self.rest = samples.points
-        self.normals = samples.normals
-        self.shapedirs = np.einsum("nk,nkcs->ncs", share, template.shapedirs[corners])
-        self.weights = np.einsum("nk,nkj->nj", share, template.weights[corners])
+        self.rest, self.normals = rest, normals
+        self.shapedirs = _mixed(mix, template.shapedirs)
+        self.weights = _mixed(mix, template.weights)
         # The joints move as places that each hang on its own bone.
         self._rest = np.concatenate([self.rest, np.zeros((COUNT, 3))])
         self._weights = np.concatenate([self.weights, np.eye(COUNT)])
         self._below = self._weights @ _DESCENDANTS.T
         self._dirs = np.concatenate([self.shapedirs, template.joint_dirs])
+
+    @classmethod
+    def drawn(cls, template: SkinnedTemplate, count: int) -> BodySamples:
+        """``count`` places, drawn by area at rest."""
+        samples = sample_surface(template.rest, template.faces, count, np.random.default_rng(0))
+        corners = template.faces[samples.faces]
+        rows = np.repeat(np.arange(count), 3)
+        mix = sparse.csr_array(
+            (samples.barycentric.ravel(), (rows, corners.ravel())), (count, len(template.rest))
+        )
+        return cls(template, samples.points, samples.normals, mix)
+
+    @classmethod
+    def of_vertices(cls, template: SkinnedTemplate, chosen: NDArray[np.int64]) -> BodySamples:
+        """The template's vertices ``[n]``; their normals are not known, and zero."""
+        mix = sparse.csr_array(
+            (np.ones(len(chosen)), (np.arange(len(chosen)), chosen)),
+            (len(chosen), len(template.rest)),
+        )
+        return cls(template, template.rest[chosen], np.zeros((len(chosen), 3)), mix)
 
     def at(self, body: Body) -> tuple[Array, Array]:
         """Points and unit normals ``[n, 3]`` of a body."""
@@ -137,6 +162,12 @@ def stepped(body: Body, turned: Array, step: Array) -> Body:
         scale=float(scale),
         translation=body.translation + step[PLACE],
     )
+
+
+def _mixed(mix: sparse.csr_array, values: Array) -> Array:
+    """``[n, ...]`` means of per-vertex values ``[V, ...]``."""
+    flat = np.asarray(mix @ values.reshape(len(values), -1))
+    return flat.reshape(-1, *values.shape[1:])
 
 
 def _unit(vectors: Array) -> Array:

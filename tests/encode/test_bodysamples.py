@@ -22,7 +22,7 @@ def body() -> Body:
 
 
 def test_samples_lie_on_the_body(human: SkinnedTemplate, body: Body) -> None:
-    samples = BodySamples(human, 300)
+    samples = BodySamples.drawn(human, 300)
     points, normals = samples.at(body)
     surface = human.decode(body)
     nearest = np.linalg.norm(points[:, None] - surface[None], axis=2).min(axis=1)
@@ -35,7 +35,7 @@ def test_samples_lie_on_the_body(human: SkinnedTemplate, body: Body) -> None:
 
 
 def test_the_derivative_is_that_of_small_steps(human: SkinnedTemplate, body: Body) -> None:
-    samples = BodySamples(human, 60)
+    samples = BodySamples.drawn(human, 60)
     line = samples.linearise(body)
     h = 1e-6
     for index in range(STEP):
@@ -52,7 +52,7 @@ def test_a_turn_moves_only_what_hangs_on_the_joint(human: SkinnedTemplate, body:
     elbow = JOINTS.index("left_elbow")
     step = np.zeros(STEP)
     step[3 * elbow : 3 * elbow + 3] = (0.3, -0.2, 0.1)
-    turned = BodySamples(human, 10).linearise(body).turned
+    turned = BodySamples.drawn(human, 10).linearise(body).turned
     after = human.posed_joints(stepped(body, turned, step))
     moved = np.linalg.norm(after - human.posed_joints(body), axis=1) > 1e-9
     below = descendants()[elbow].copy()
@@ -63,7 +63,7 @@ def test_a_turn_moves_only_what_hangs_on_the_joint(human: SkinnedTemplate, body:
 def test_a_step_changes_shape_scale_and_place(human: SkinnedTemplate, body: Body) -> None:
     step = np.zeros(STEP)
     step[SHAPE], step[LOG_SCALE], step[PLACE] = (1.0, 2.0, 3.0), np.log(2.0), (4.0, 5.0, 6.0)
-    turned = BodySamples(human, 10).linearise(body).turned
+    turned = BodySamples.drawn(human, 10).linearise(body).turned
     after = stepped(body, turned, step)
     assert np.allclose(after.shape - body.shape, (1.0, 2.0, 3.0))
     assert after.scale == pytest.approx(2.0 * body.scale)
