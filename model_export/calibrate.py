@@ -8,8 +8,7 @@ import numpy as np
 
 from model_export.realistic import RealisticShape
 from model_export.truth import Judged
-from service.encode.estimate import estimate
-from service.encode.model import SIGMA_FLOOR, Model
+from service.encode.model import SIGMA_FLOOR, BodyModel, Model
 from service.mesh.formats import read_mesh
 from service.mesh.frame import CANONICAL
 from service.mesh.surface import Samples, sample_surface
@@ -37,11 +36,14 @@ def calibrate(
         model: the category; its card need not have a calibration yet.
         shapes: ordinary real shapes, canonically oriented; may be none.  Odds are taken from those
             held out, since a discriminator is too sure of what it has learned.
-        drawn: samples of template shapes, for a category without real ones.
+        drawn: samples of template shapes, for a category without real ones; those of bodies, who
+            come in more poses and clothes than real ones at hand, count in any case.
     """
     samples = [_samples(model, shape) for shape in shapes] or list(drawn)
     unseen = [s for s, shape in zip(samples, shapes, strict=False) if shape.held_out] or samples
-    distances = [estimate(model, s).distance for s in samples]
+    if isinstance(model, BodyModel) and shapes:
+        samples, unseen = [*samples, *drawn], [*unseen, *drawn]
+    distances = [model.estimate(s, refined=True).distance for s in samples]
     odds = [model.discriminator.odds(s.points, [CANONICAL])[0] for s in unseen]
     farther, lower = (1.0, 0.0) if shapes else (DRAWN_FARTHER, DRAWN_ODDS)
     return {

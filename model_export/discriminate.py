@@ -24,6 +24,7 @@ from torch.nn import functional
 from tqdm import tqdm
 
 from model_export.bodies import Garments, SyntheticBodies
+from model_export.bodytruth import synthetic_bodies
 from model_export.calibrate import calibrate
 from model_export.config import SHIPPED
 from model_export.distractors import heaps, other_shapes
@@ -33,10 +34,18 @@ from model_export.realistic import RealisticShape, find_shapes, normalise
 from model_export.samples import clouds_of, synthetic_samples
 from model_export.synthetic import Augmentation, SyntheticShapes
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
-from service.encode.model import Model, file_digest, template_source
+from service.encode.model import (
+    AffineModel,
+    BodyModel,
+    Model,
+    file_digest,
+    load_model,
+    template_source,
+)
 from service.mesh.frame import orientations
 from service.mesh.surface import Samples
 from service.template.affine import AffineTemplate
+from service.template.bodyfile import load_body
 from service.template.loader import load_template
 from service.template.skinned import SkinnedTemplate
 
@@ -244,15 +253,25 @@ def build(
     }
 
 
-def assess(model: Model, data: Data, cache: Path) -> None:
+def drawn_by(model: Model, count: int) -> list[Samples]:
+    """Samples of synthetic shapes of a model's category: clean ones, or bodies in clothes."""
+    if isinstance(model, BodyModel):
+        garments = Garments(partial=0.0, tilt=0.0)
+        bodies = synthetic_bodies(model.template, garments, count, model.points)
+        return [body.samples for body in bodies]
+    assert isinstance(model, AffineModel)
+    return synthetic_samples(model, count)[0]
+
+
+def assess(model: Model, card: dict[str, Any], data: Data, cache: Path) -> None:
     """Fill in what a model's card says of its discriminator's accuracy, and its calibration."""
     held_out = [shape for shape in data.shapes if shape.held_out]
-    drawn = synthetic_samples(model, 100)[0]
+    drawn = drawn_by(model, 100)
     real = clouds_of(held_out, cache, POOL) or [samples.points for samples in drawn]
     strange = [s.points for s in (*heaps(50, POOL, 1), *data.others(POOL, held_out=True))]
-    model.card["discriminator"]["measured"] = measure(model, real, strange)
+    card["discriminator"]["measured"] = measure(model, real, strange)
     ordinary = [shape for shape in data.shapes if shape.info.get("core", True)]
-    model.card["calibration"] = calibrate(model, ordinary, drawn)
+    card["calibration"] = calibrate(model, ordinary, drawn)
 
 
 def main() -> None:
@@ -275,14 +294,19 @@ def main() -> None:
     data = Data.of(arguments.realistic, arguments.others, arguments.but)
     path = arguments.models / f"{arguments.name}.json"
     card = json.loads(path.read_text("utf-8"))
-    template = load_template(template_source(path, arguments.name))
+    template: AffineTemplate | SkinnedTemplate
+    if card.get("kind") == BodyModel.kind:
+        template = load_body()
+    else:
+        template = load_template(template_source(path, arguments.name))
     network = path.with_suffix(DISCRIMINATOR_SUFFIX)
     card["discriminator"] = build(template, data, arguments.steps, network, arguments.cache)
-    model = Model(card, template, path.with_suffix(".onnx"), threads=1)
-    assess(model, data, arguments.cache)
+    write_card(card, path)
+    model = load_model(path)
+    assess(model, card, data, arguments.cache)
     write_card(card, path)
     model.verify()
-    print(json.dumps({k: model.card[k] for k in ("discriminator", "calibration")}, indent=2))
+    print(json.dumps({name: card[name] for name in ("discriminator", "calibration")}, indent=2))
 
 
 if __name__ == "__main__":

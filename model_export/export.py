@@ -26,7 +26,7 @@ from model_export.samples import clouds_of
 from model_export.train import template_copy
 from model_export.truth import judge, read_truth, rescaled, summary
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
-from service.encode.model import Model, file_digest, golden_cloud
+from service.encode.model import AffineModel, file_digest, golden_cloud
 from service.encode.session import EncoderSession
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
@@ -206,8 +206,8 @@ def main() -> None:
     else:
         second = path.with_suffix(DISCRIMINATOR_SUFFIX)
         card["discriminator"] = build(template, data, arguments.steps, second, arguments.cache)
-    model = Model(card, template, path, threads=1)
-    assess(model, data, arguments.cache)
+    model = AffineModel(card, template, path, threads=1)
+    assess(model, card, data, arguments.cache)
     card["metrics"] = {"synthetic": synthetic_table(model, arguments.count)}
     if shapes:
         held_out = [shape for shape in shapes if shape.held_out]

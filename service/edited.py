@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from service.deform.admissible import unusual
-from service.deform.dimensions import Dimensions, Outcome
 from service.deform.flips import count_flips
 from service.inference import Inference
 from service.mesh.convert import convert
@@ -41,27 +40,33 @@ class Edited:
 
 
 @dataclass(frozen=True)
+class Shift:
+    """A parameter or derived dimension that users see, before an edit and after it."""
+
+    name: str
+    before: float
+    after: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Moved:
     """Where an edit takes an upload.
 
     Attributes:
         found: the upload and its parameters before.
-        dimensions: of the bound mesh.
-        outcome: the parameters after, and what held them back.
+        parameters, derived: what they were and are.
         vertices: ``[V, 3]`` new positions in the file's own frame.
         linear: ``[V, 3, 3]`` local linear maps, likewise.
+        warnings: what the client should know of the edit.
     """
 
     found: Inference
-    dimensions: Dimensions
-    outcome: Outcome
+    parameters: Sequence[Shift]
+    derived: Sequence[Shift]
     vertices: Array
     linear: NDArray[np.floating]
-
-    @property
-    def after(self) -> Array:
-        """``[d]`` parameters after the edit."""
-        return self.outcome.parameters
+    warnings: Sequence[str]
 
 
 def write_edited(moved: Moved, format: str | None) -> Edited:
@@ -78,68 +83,35 @@ def write_edited(moved: Moved, format: str | None) -> Edited:
         factor = file_unit(format, found.unit) / file_unit(mesh.format, found.unit)
         data = convert(moved.vertices / factor, mesh.faces, format)
         media_type = next(kind for kind, name in MEDIA_TYPES.items() if name == format)
-    before = found.dimensions().derived(found.parameters)
-    after = moved.dimensions.derived(moved.after)
-    values = {name: new for name, _, new in _public(moved)}
-    report = _report(moved, before, after)
-    return Edited(data, format or mesh.suffix, media_type, values | after, report)
+    values = {shift.name: shift.after for shift in (*moved.parameters, *moved.derived)}
+    return Edited(data, format or mesh.suffix, media_type, values, _report(moved))
 
 
-def _public(moved: Moved) -> list[tuple[str, float, float]]:
-    """Name, value before and value after of each parameter that users see."""
-    template = moved.found.model.template
-    columns = (moved.found.parameters.tolist(), moved.after.tolist(), template.public)
-    rows = zip(template.names, *columns, strict=True)
-    return [(name, old, new) for name, old, new, seen in rows if seen]
-
-
-def _report(moved: Moved, before: dict[str, float], after: dict[str, float]) -> dict[str, Any]:
+def _report(moved: Moved) -> dict[str, Any]:
     found, mesh = moved.found, moved.found.mesh
     flips = count_flips(mesh.vertices, moved.vertices, mesh.faces, moved.linear)
     return {
         "category": found.model.name,
-        "model": found.describe_model(),
-        "parameters": {
-            name: {"before": old, "after": new, "unit": found.unit}
-            for name, old, new in _public(moved)
-        },
-        "derived": {
-            name: {"before": old, "after": after[name], "unit": found.unit}
-            for name, old in before.items()
-        },
+        "model": found.model.identity,
+        "parameters": _changes(moved.parameters),
+        "derived": _changes(moved.derived),
         "vertices": {
             "total": len(mesh.vertices),
             "moved": int((moved.vertices != mesh.vertices).any(axis=1).sum()),
         },
         "flipped_faces": flips,
-        "warnings": [*found.warnings, *_warnings(moved, flips)],
+        "warnings": [*found.warnings, *moved.warnings, *_folds(flips, len(mesh.faces))],
     }
 
 
-def _warnings(moved: Moved, flips: int) -> list[str]:
-    template = moved.found.best.estimate.template
-    unit, before, after = moved.found.unit, moved.found.parameters, moved.after
-    reason = ", ".join(moved.outcome.limits)
-    warnings = [
-        f"{name} is {got:.4g} {unit}, not {asked:.4g}: "
-        + (f"the nearest that keeps {reason}" if reason else "the edits contradict each other")
-        for name, (asked, got) in moved.outcome.adjusted.items()
-    ]
-    # What the bounds keep may miss zero by rounding.
-    held = template.broken_relations(before) + [
-        text.removesuffix(" >= 0") for text in moved.outcome.limits
-    ]
-    warnings += [
-        f"{text} is now negative: parts may run into each other"
-        for text in template.broken_relations(after)
-        if text not in held
-    ]
-    warnings += [
-        f"{name} is outside of what the model was trained on, for the rest of the shape"
-        for name in unusual(template, before, after)
-    ]
-    if flips > MANY_FLIPS * len(moved.found.mesh.faces):
-        warnings.append(
-            f"{flips} faces turned inside out: the edit is more than this mesh can follow"
-        )
-    return warnings
+def _changes(shifts: Sequence[Shift]) -> dict[str, dict[str, Any]]:
+    return {
+        shift.name: {"before": shift.before, "after": shift.after, "unit": shift.unit}
+        for shift in shifts
+    }
+
+
+def _folds(flips: int, faces: int) -> list[str]:
+    if flips <= MANY_FLIPS * faces:
+        return []
+    return [f"{flips} faces turned inside out: the edit is more than this mesh can follow"]

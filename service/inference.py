@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,12 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.deform.dimensions import Dimensions
-from service.encode.model import Model
+from service.encode.basemodel import Model
 from service.encode.recognition import Candidate
 from service.mesh.meshfile import MeshFile
-from service.requests import UNITS, Upload
-from service.sizes import size_warning
+from service.requests import Upload
 
 Array = NDArray[np.float64]
 
@@ -25,8 +24,10 @@ IN_DISTRIBUTION = 0.5
 
 
 @dataclass(frozen=True)
-class Inference:
+class Inference(ABC):
     """An upload's parameters, and the way between its frame and the normalised one.
+
+    What they are depends on the kind of the category: a subclass each knows.
 
     Attributes:
         upload, mesh: the file, as bytes and read.
@@ -68,36 +69,39 @@ class Inference:
         return self.best.estimate.normalization.apply(canonical)
 
     @property
+    @abstractmethod
     def parameters(self) -> Array:
-        """``[d]`` in the reported unit."""
-        return self.best.estimate.parameters / self.scale
+        """``[d]`` in the reported units."""
 
-    def dimensions(self, jacobian: NDArray[np.floating] | None = None) -> Dimensions:
-        """The mesh's dimensions in the reported unit; with a Jacobian, as they can be changed."""
-        template = self.best.estimate.template
-        return Dimensions(template, self.parameters, self.vertices, self.scale, jacobian)
+    @abstractmethod
+    def parameter_report(self) -> dict[str, dict[str, Any]]:
+        """Value, sigma and unit of each parameter that users see."""
 
-    def describe_model(self) -> dict[str, str]:
-        """Which model it was."""
-        model = self.model
-        return {"name": model.name, "version": model.version, "digest": model.digest}
+    @abstractmethod
+    def derived_report(self) -> dict[str, dict[str, Any]]:
+        """Value and unit of each derived dimension."""
+
+    @abstractmethod
+    def fit_report(self) -> dict[str, Any]:
+        """What is told of the fit beside what is told of every one."""
+
+    def further_report(self) -> dict[str, Any]:
+        """What is told beside what is told of every category."""
+        return {}
+
+    @abstractmethod
+    def further_warnings(self) -> list[str]:
+        """What the client should know beside what it should of every category."""
 
     def report(self) -> dict[str, Any]:
         """The answer to `POST /infer`."""
         best, fit = self.best, self.best.estimate
-        template = self.model.template
-        columns = (self.parameters, fit.sigma / self.scale, template.public)
-        rows = zip(template.names, *columns, strict=True)
-        derived = self.dimensions().derived(self.parameters)
         return {
             "mesh_id": self.upload.mesh_id,
             "category": self.model.name,
-            "parameters": {
-                name: {"value": float(value), "sigma": float(sigma), "unit": self.unit}
-                for name, value, sigma, seen in rows
-                if seen
-            },
-            "derived": {n: {"value": v, "unit": self.unit} for n, v in derived.items()},
+            "parameters": self.parameter_report(),
+            "derived": self.derived_report(),
+            **self.further_report(),
             "frame": {
                 "up": best.orientation.up,
                 "front": best.orientation.front,
@@ -109,7 +113,7 @@ class Inference:
             "fit": {
                 "distance": fit.distance,
                 "encoder_distance": fit.encoder_distance,
-                "variant": fit.template.variant or None,
+                **self.fit_report(),
                 "in_distribution": self.in_distribution,
                 "score": best.score,
                 "candidates": [
@@ -123,21 +127,15 @@ class Inference:
                     for candidate in self.candidates
                 ],
             },
-            "model": self.describe_model(),
+            "model": self.model.identity,
             "warnings": self.warnings,
         }
 
     @cached_property
     def warnings(self) -> list[str]:
         """What the client should know."""
-        found = (
-            self._close_call(),
-            self._strange(),
-            self._lean(),
-            self._inside_out(),
-            self._size(),
-        )
-        return [warning for warning in found if warning]
+        found = (self._close_call(), self._strange(), self._lean(), self._inside_out())
+        return [*(warning for warning in found if warning), *self.further_warnings()]
 
     def _close_call(self) -> str | None:
         best, *others = self.candidates
@@ -172,12 +170,4 @@ class Inference:
         return (
             "the faces are wound inside out, as a mirrored mesh's are; it is read as if they were "
             "not, and answered as it came"
-        )
-
-    def _size(self) -> str | None:
-        return size_warning(
-            self.model.template,
-            self.parameters * UNITS[self.unit],
-            self.mesh.format,
-            self.unit,
         )

@@ -58,7 +58,9 @@ def _context(settings: Settings) -> Context:
     workers = settings.workers or cpus
     # Each worker's inference gets its share of the CPUs.
     threads = max(1, cpus // workers)
-    catalog = Catalog(partial(load_models, SHIPPED, threads), settings.models_dir, threads)
+    body = settings.body_model
+    shipped = partial(load_models, SHIPPED, threads, body)
+    catalog = Catalog(shipped, settings.models_dir, threads, body)
     pool = Workers(workers, settings.deadline_seconds)
     return Context(MeshStore(settings.mesh_cache_bytes), Readiness(catalog.load, pool), pool)
 

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from service import deadline
-from service.deform import blend, paper
-from service.deform.binding import Binding
-from service.deform.followers import following
-from service.deform.unfold import unfold
+from service import affineedit, bodyedit, deadline
+from service.affineinference import AffineInference
+from service.bodyinference import BodyInference
 from service.edited import Edited, Moved, write_edited
 from service.edits import Change
-from service.encode.model import Model
+from service.encode.affinemodel import AffineModel
+from service.encode.basemodel import Model
+from service.encode.bodymodel import BodyModel
 from service.encode.recognition import recognise
 from service.errors import InvalidRequest, NotFound
 from service.inference import Inference
 from service.mesh.formats import read_mesh
 from service.mesh.frame import AUTO, orientations
 from service.mesh.meshfile import MeshFile
-from service.mesh.surface import Samples, sample_surface
+from service.mesh.surface import Samples, Surface, sample_surface
 from service.requests import (
     MODES,
     UNITS,
@@ -31,8 +32,26 @@ from service.requests import (
     file_unit,
     require_units,
 )
+from service.skeleton import Skeleton
 
-Array = NDArray[np.float64]
+
+@dataclass(frozen=True)
+class _Kind:
+    """What depends on the kind of a category.
+
+    Attributes:
+        inference: what is known of an upload of one.
+        move: carries out an edit of it.
+    """
+
+    inference: type[Inference]
+    move: Callable[[Any, Mapping[str, Change], EditOptions, str], Moved]
+
+
+_KINDS = {
+    AffineModel.kind: _Kind(AffineInference, affineedit.move),
+    BodyModel.kind: _Kind(BodyInference, bodyedit.move),
+}
 
 
 def infer(upload: Upload, models: Mapping[str, Model], options: InferOptions) -> Inference:
@@ -48,10 +67,12 @@ def infer(upload: Upload, models: Mapping[str, Model], options: InferOptions) ->
     deadline.check()
     samples = {points: _sample(mesh, points) for points in {model.points for model in chosen}}
     deadline.check()
-    candidates = recognise(chosen, samples, ways, options.refine)
     # glTF is in metres whatever the client's unit; other files are in the unit it names.
-    unit_scale = file_unit(mesh.format, options.units) / UNITS[options.units]
-    return Inference(upload, mesh, candidates, options.units, unit_scale)
+    unit = file_unit(mesh.format, options.units)
+    surface = Surface(mesh.vertices, mesh.faces, 1.0 / unit)
+    candidates = recognise(chosen, samples, ways, options.refine, surface)
+    kind = _KINDS[candidates[0].model.kind]
+    return kind.inference(upload, mesh, candidates, options.units, unit / UNITS[options.units])
 
 
 def edit(
@@ -71,24 +92,26 @@ def edit(
     _require_recognised(found, options.category)
     keep = _anchor(found.model, edit_options.keep)
     deadline.check()
-    binding = _bind(found, edit_options.mode)
-    deadline.check()
-    after = found.dimensions(binding.jacobian).after(edits)
-    if edit_options.mode == "blend":
-        changed = np.flatnonzero(after != found.parameters).tolist()
-        fit = found.best.estimate.parameters
-        binding = unfold(binding, found.vertices, found.mesh.faces, fit, changed)
-    dimensions = found.dimensions(binding.jacobian)
-    outcome = dimensions.outcome(edits, edit_options.strict)
-    after = outcome.parameters
-    change = np.where(after == found.parameters, 0.0, (after - found.parameters) * found.scale)
-    _, anchor = found.best.estimate.template.anchor(keep)
-    turn, scale = found.best.orientation, found.best.estimate.normalization.scale
-    shift = turn.to_own((binding.displace(change) - anchor @ change) / scale)
-    linear = turn.maps_to_own(binding.linear(change))
-    deadline.check()
-    moved = Moved(found, dimensions, outcome, found.mesh.vertices + shift, linear)
+    moved = _KINDS[found.model.kind].move(found, edits, edit_options, keep)
     return write_edited(moved, edit_options.format)
+
+
+def skeleton(upload: Upload, models: Mapping[str, Model], options: InferOptions) -> Skeleton:
+    """A body's upload, bound to the skeleton that was found in it.
+
+    Raises:
+        ShapeError: as `infer`, and when it is no body.
+    """
+    found = infer(upload, models, options)
+    _require_recognised(found, options.category)
+    if not isinstance(found, BodyInference):
+        raise InvalidRequest(
+            "no_skeleton",
+            f"a {found.model.name} has no skeleton",
+            "Send a mesh of a category of bodies.",
+        )
+    deadline.check()
+    return Skeleton.of(found)
 
 
 def _categories(models: Mapping[str, Model], category: str) -> list[Model]:
@@ -127,21 +150,13 @@ def _require_mode(mode: str) -> None:
 
 def _anchor(model: Model, keep: str | None) -> str:
     """The point to hold in place: the client's, else the category's first."""
-    anchors = list(model.template.anchors)
-    if keep is not None and keep not in anchors:
+    if keep is not None and keep not in model.keeps:
         raise InvalidRequest(
             "unknown_keep",
             f"a {model.name} can't keep {keep[:40]!r}",
-            f"Use one of {', '.join(anchors)}.",
+            f"Use one of {', '.join(model.keeps)}.",
         )
-    return keep or anchors[0]
-
-
-def _bind(found: Inference, mode: str) -> Binding:
-    rule = blend.bind if mode == "blend" else paper.bind
-    fit = found.best.estimate
-    template = following(fit.template, fit.parameters)
-    return rule(found.vertices, found.mesh.faces, template, fit.parameters, fit.translation)
+    return keep or model.keeps[0]
 
 
 def _sample(mesh: MeshFile, points: int) -> Samples:

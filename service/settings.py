@@ -32,6 +32,10 @@ class Settings(BaseSettings):
     """Folder of models of your own, as `model_export.export` writes them: served beside the shipped
     ones, in place of one of the same name. SIGHUP reads it anew."""
 
+    body_model: Path | None = None
+    """File of a body of your own in SMPL's format, .npz or .pkl, for human bodies to be fitted by
+    in place of the shipped one; it is read when the service starts."""
+
     max_upload_bytes: PositiveInt = 128 * MEBIBYTE
     """Largest request body, in bytes; more is answered with 413."""
 

@@ -12,6 +12,11 @@ Array = NDArray[np.float64]
 
 LENIENT = 2.5
 """Shapes may be so many times smaller or larger than typical ones without remark."""
+STATURE, ADULT = 1.65, 1.35
+"""Metres that adults are tall, and how many times smaller or taller they may be without remark:
+from 1.22 to 2.23 m."""
+CHILD = 0.45, 1.22
+"""Metres that children are tall who are noticeably shorter."""
 
 
 def size_ratio(template: AffineTemplate, metres: Array) -> float:
@@ -40,11 +45,25 @@ def size_warning(template: AffineTemplate, metres: Array, format: str, unit: str
     """
     spread = max(high / low for low, high in _typical(template)) ** 0.5
     ratio = size_ratio(template, metres)
-    if 1.0 / (LENIENT * spread) <= ratio <= LENIENT * spread:
+    return _warning(template.name, ratio, LENIENT * spread, format, unit)
+
+
+def stature_warning(name: str, metres: float, format: str, unit: str) -> str | None:
+    """The same for a body of a stature in metres, as the file's unit has it."""
+    warning = _warning(name, metres / STATURE, ADULT, format, unit)
+    if warning is not None and CHILD[0] < metres < CHILD[1]:
+        return f"{warning}; or it is a child, whose proportions the body has none of"
+    return warning
+
+
+def _warning(name: str, ratio: float, lenient: float, format: str, unit: str) -> str | None:
+    """What to say of a shape that is ``ratio`` times as large as usual, if that is more than
+    ``lenient`` times too large or too small."""
+    if 1.0 / lenient <= ratio <= lenient:
         return None
     told = "metres" if format in METRIC else unit
     start = (
-        f"a {template.name} of this size would be {ratio:.2g} times as large as usual, "
+        f"a {name} of this size would be {ratio:.2g} times as large as usual, "
         f"with {told} as the unit of the file"
     )
     factor = UNITS["m" if format in METRIC else unit]
@@ -54,8 +73,8 @@ def size_warning(template: AffineTemplate, metres: Array, format: str, unit: str
         if length != factor
     }
     likely = min(others, key=lambda name: others[name])
-    if others[likely] > np.log(LENIENT * spread):
-        return f"{start}; its scale may be arbitrary: parameters are in {told} all the same"
+    if others[likely] > np.log(lenient):
+        return f"{start}; its scale may be arbitrary: lengths are in {told} all the same"
     if format in METRIC:
         return f"{start}; it seems to be in {likely}, but its format's unit is the metre"
     return f"{start}; it seems to be in {likely}: say units={likely}"

@@ -7,18 +7,22 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
+from pathlib import Path
 
 import httpx
 import pytest
 import trimesh
 import uvicorn
 from plain_chair import PLAIN
+from pretend_body import posed, write_body_model
 from starlette.types import ASGIApp
 
 from service.api.schemas import ProblemDocument
 from service.main import create_app
 from service.settings import Settings
+from service.template.bodyfile import load_body
 from service.template.loader import load_template
+from service.template.skinned import Body, SkinnedTemplate
 
 Serve = Callable[[ASGIApp], httpx.Client]
 Serving = Callable[[ASGIApp], AbstractContextManager[httpx.Client]]
@@ -97,3 +101,25 @@ def box_chair() -> trimesh.Trimesh:
 def chair_glb(box_chair: trimesh.Trimesh) -> bytes:
     """The box chair as a GLB file."""
     return bytes(box_chair.export(file_type="glb"))
+
+
+@pytest.fixture(scope="session")
+def human() -> SkinnedTemplate:
+    """The shipped body."""
+    return load_body()
+
+
+@pytest.fixture(scope="session")
+def strider(human: SkinnedTemplate) -> Body:
+    """Someone in mid-stride, in metres."""
+    return posed(human)
+
+
+@pytest.fixture(scope="session")
+def body_folder(
+    human: SkinnedTemplate, strider: Body, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """A models folder with a model of bodies that knows but this one."""
+    folder = tmp_path_factory.mktemp("body")
+    write_body_model(folder, human, strider)
+    return folder

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -24,15 +25,15 @@ def test_making_an_app_loads_no_model(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_workers_share_the_cpus(monkeypatch: pytest.MonkeyPatch, serve: Any) -> None:
     asked: list[Any] = []
 
-    def load(directory: Any, threads: int) -> Any:
-        asked.append((directory, threads))
+    def load(directory: Any, threads: int, body: Any) -> Any:
+        asked.append((directory, threads, body))
         return {}
 
     monkeypatch.setattr(main, "cpu_count", lambda: 8)
     monkeypatch.setattr(main, "load_models", load)
-    app = main.create_app(Settings(workers=3))
+    app = main.create_app(Settings(workers=3, body_model=Path("mine.npz")))
     serve(app).get("/categories")
-    assert asked == [(SHIPPED, 2)]
+    assert asked == [(SHIPPED, 2, Path("mine.npz"))]
     assert app.state.context.workers.count == 3
     assert main.create_app(Settings(workers=None)).state.context.workers.count == 8
 

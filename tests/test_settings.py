@@ -11,6 +11,7 @@ NAMES = [
     "HOST",
     "PORT",
     "MODELS_DIR",
+    "BODY_MODEL",
     "MAX_UPLOAD_BYTES",
     "MESH_CACHE_BYTES",
     "WORKERS",
@@ -31,18 +32,20 @@ def test_the_defaults_serve_this_machine_only() -> None:
     assert settings.max_upload_bytes == 134217728
     assert settings.mesh_cache_bytes == 268435456
     assert settings.models_dir is None
+    assert settings.body_model is None
     assert settings.workers is None
     assert settings.deadline_seconds == 30
 
 
 def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    values = ["0.0.0.0", "80", "/m", "5", "0", "3", "2.5", "DEBUG"]
+    values = ["0.0.0.0", "80", "/m", "/b.npz", "5", "0", "3", "2.5", "DEBUG"]
     for name, value in zip(NAMES, values, strict=True):
         monkeypatch.setenv(name, value)
     assert Settings() == Settings(
         host="0.0.0.0",
         port=80,
         models_dir=Path("/m"),
+        body_model=Path("/b.npz"),
         max_upload_bytes=5,
         mesh_cache_bytes=0,
         workers=3,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from plain_chair import PLAIN
 
-from service.sizes import size_ratio, size_warning
+from service.sizes import size_ratio, size_warning, stature_warning
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
 
@@ -57,3 +57,26 @@ def test_signed_and_nuisance_parameters_say_nothing_of_size() -> None:
     assert size_ratio(airplane, middle) == pytest.approx(1.0)
     moved = np.where(airplane.public, middle, -100.0)
     assert size_ratio(airplane, moved) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("metres", [1.25, 1.7, 2.2])
+def test_grown_people_are_passed_over(metres: float) -> None:
+    assert stature_warning("human", metres, "obj", "m") is None
+
+
+@pytest.mark.parametrize(
+    ("metres", "unit", "likely"), [(175, "m", "cm"), (0.0175, "cm", "m"), (5.6, "m", "ft")]
+)
+def test_a_persons_unit_is_guessed(metres: float, unit: str, likely: str) -> None:
+    warning = stature_warning("human", metres, "obj", unit)
+    assert warning is not None
+    assert warning.endswith(f"it seems to be in {likely}: say units={likely}")
+
+
+def test_who_is_small_may_be_a_child() -> None:
+    small, tiny = (stature_warning("human", metres, "glb", "m") for metres in (1.0, 0.2))
+    assert small is not None
+    assert tiny is not None
+    assert "a human of this size would be 0.61 times as large as usual" in small
+    assert "child" in small
+    assert "child" not in tiny

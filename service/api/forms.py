@@ -94,8 +94,8 @@ class EditForm(InferForm):
     ]
     mode: Annotated[
         Literal["blend", "paper"],
-        Field(description="How the mesh follows its template: blended transforms of the parts, or "
-            "the paper's weighted displacements."),
+        Field(description="How the mesh follows its template: blended transforms of the parts "
+            "or bones, or the paper's weighted displacements."),
     ] = "blend"  # fmt: skip
     keep: Annotated[
         Text,

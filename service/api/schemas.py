@@ -41,6 +41,7 @@ class Estimate(Schema):
     sigma: float
     """Standard deviation of the value, in the same unit."""
     unit: Unit
+    """Of length, or `rad` for angles and `1` for coefficients."""
 
 
 class Measure(Schema):
@@ -86,6 +87,9 @@ class Fit(Schema):
     """The same before the values were refined."""
     variant: str | None = Field(examples=["armchair"])
     """Which kind of the category it is, where there are several."""
+    encoder: Literal["point", "mesh"] | None = None
+    """What read a body: samples of its surface, or the mesh itself, where it has the template's own
+    vertices and faces."""
     in_distribution: bool
     """False: the mesh is unlike what the model was trained on; take the values with care."""
     score: float
@@ -111,6 +115,11 @@ class InferReport(Schema):
     derived: dict[str, Measure] = Field(
         examples=[{"seat_top_height": {"value": 0.45, "unit": "m"}}]
     )
+    joints: dict[str, Vector] | None = Field(
+        default=None, examples=[{"pelvis": [0.0, 0.93, 0.01], "left_hip": [0.07, 0.86, 0.01]}]
+    )
+    """Of a body: where its joints are, by SMPL's names, in the upload's own frame and the unit that
+    lengths are reported in."""
     frame: Frame
     fit: Fit
     model: ModelIdentity
@@ -161,7 +170,7 @@ class Parameter(Schema):
     unit: Unit
     kind: Literal["length", "angle", "coefficient"]
     range: tuple[float, float]
-    """What the model was trained on."""
+    """What the model was trained on; of angles, what joints can reach."""
     typical: tuple[float, float]
     """What most real shapes have: a slider's ends."""
     step: float

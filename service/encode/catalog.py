@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
+from service.encode.meshencoder import MESH_SUFFIX
 from service.encode.model import Model, file_digest, load_model
 from service.errors import ModelFault, ShapeError
 from service.mesh.frame import AUTO
 
-SUFFIXES = (".json", ".onnx", DISCRIMINATOR_SUFFIX, ".yaml")
+SUFFIXES = (".json", ".onnx", DISCRIMINATOR_SUFFIX, MESH_SUFFIX, ".yaml")
 """The files of a model of one's own: its card, its networks and its template."""
 
 logger = logging.getLogger(__name__)
@@ -40,17 +41,23 @@ class Catalog:
     """
 
     def __init__(
-        self, shipped: Callable[[], Mapping[str, Model]], own: Path | None, threads: int
+        self,
+        shipped: Callable[[], Mapping[str, Model]],
+        own: Path | None,
+        threads: int,
+        body: Path | None = None,
     ) -> None:
         """
         Args:
             shipped: loads the models that come with the service.
             own: folder of the operator's; a model there replaces a shipped one of its name.
             threads: that one encoding may use.
+            body: the operator's body file, for models of bodies.
         """
         self._load_shipped = shipped
         self._own = own
         self._threads = threads
+        self._body = body
         self._shipped: Mapping[str, Model] | None = None
         self._loaded: dict[str, tuple[str, Model]] = {}
 
@@ -98,10 +105,11 @@ class Catalog:
         """The model of a card with the digest of its files; the one before if they are the same."""
         try:
             files = [card.with_suffix(suffix) for suffix in SUFFIXES]
+            files += [self._body] if self._body else []
             digest = " ".join(file_digest(file) for file in files if file.is_file())
             if before is not None and before[0] == digest:
                 return before
-            model = load_model(card, self._threads)
+            model = load_model(card, self._threads, self._body)
             if model.name != card.stem or model.name == AUTO:
                 raise ModelFault(
                     "model_name",

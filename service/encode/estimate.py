@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from service.encode.affineoutputs import Encoding
+from service.encode.basemodel import STEEPNESS
 from service.encode.distance import Cloud, surface_distance
-from service.encode.model import SIGMA_FLOOR, STEEPNESS, Encoding, Model
 from service.encode.refine import STANDARD, Settings, refine
 from service.mesh.surface import Normalization, Samples, sample_surface
 from service.template.affine import AffineTemplate
@@ -23,11 +25,27 @@ PROBES = 600
 OPPOSED = -0.3
 """A cloud whose normals agree with the template's no better than this, on the mean, is inside
 out."""
+SIGMA_FLOOR = 0.002
+"""Least standard deviation claimed for a refined parameter: the repeat error of measuring real
+shapes by hand is of this size (in the normalised frame's unit)."""
 SIGMA_ENCODER = 0.04
-"""Standard deviation claimed for the encoder alone, likewise."""
+"""Claimed for the encoder alone, likewise."""
 CHOICES, DOUBT = 2, 0.02
 """Variants of the template that are fitted at most, and how likely the second must seem beside the
 first."""
+
+
+class AffineEncoder(Protocol):
+    """What is asked of a model."""
+
+    template: AffineTemplate
+
+    @property
+    def sigma_scale(self) -> Array:
+        """``[d]`` what a fit's own standard deviations are multiplied by to be honest."""
+
+    def encode(self, points: Array) -> Encoding:
+        """The answer for a normalised cloud ``[points, 3]``."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +74,7 @@ class Estimate:
 
 
 def estimate(
-    model: Model,
+    model: AffineEncoder,
     samples: Samples,
     refined: bool = True,
     settings: Settings = STANDARD,

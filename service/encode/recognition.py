@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.encode.estimate import Estimate, estimate
-from service.encode.model import STEEPNESS, Model
-from service.encode.refine import Settings
+from service.encode.basemodel import STEEPNESS, Fit, Model
 from service.encode.straighten import leans
 from service.mesh.frame import CANONICAL, Orientation
-from service.mesh.surface import Normalization, Samples
+from service.mesh.surface import Normalization, Samples, Surface
 
 CUSTOM = {CANONICAL: 3.0, Orientation("+z", "-y"): 1.5}
 """How much likelier than others the orientations are that most files keep to: glTF's, Blender's.
@@ -25,8 +23,6 @@ STRAIGHTER = 1.05
 """A lean is taken out where the fit's distance is then at most so many times as long."""
 LISTED = 3
 """Readings that are told of at least, where there are so many."""
-ROUGH = Settings(iterations=8, rough=0, template_points=600)
-"""Enough refinement to tell readings apart; it sees every third sample."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,7 @@ class Candidate:
     samples: Samples
     odds: float
     probability: float
-    estimate: Estimate
+    estimate: Fit
 
     @property
     def score(self) -> float:
@@ -69,6 +65,7 @@ def recognise(
     samples: dict[int, Samples],
     orientations: Sequence[Orientation],
     refined: bool,
+    surface: Surface | None = None,
 ) -> list[Candidate]:
     """Readings of an upload, best first.
 
@@ -78,11 +75,12 @@ def recognise(
         orientations: those it may have.
         refined: refine the answer.  To choose between readings the best few are refined roughly,
             whatever this says.
+        surface: the upload, which some models look at beside its samples.
 
     Returns:
         At least one candidate; the first is the answer.
     """
-    views = _views(models, samples, orientations)
+    views = _views(models, samples, orientations, surface)
     finalists = 1 + int(np.searchsorted(np.cumsum([v.probability for v in views]), DECIDED))
     finalists = min(finalists, FINALISTS, len(views))
     if finalists == 1:
@@ -91,30 +89,28 @@ def recognise(
         fitted = _weighed([view.candidate(refined=True) for view in views[:finalists]])
         listed = [*fitted, *(view.candidate(refined=False) for view in views[finalists:LISTED])]
     best = straightened(listed[0])
-    answer = estimate(best.model, best.samples, refined)
+    whole = surface and surface.turned(best.orientation)
+    answer = best.model.estimate(best.samples, refined, surface=whole)
     return [replace(best, estimate=answer), *listed[1:]]
 
 
 def straightened(candidate: Candidate) -> Candidate:
     """The candidate without its lean, if it has one and fits about as well or better without."""
     model, samples = candidate.model, candidate.samples
+    if model.turns_freely:
+        return candidate
     points = Normalization.of(samples.points).apply(samples.points)
     best, least = candidate, np.inf
-    for lean in leans(points, model.template.stands):
+    for lean in leans(points, model.stands):
         if not np.isfinite(least):
-            least = STRAIGHTER * _rough(model, samples).distance
+            least = STRAIGHTER * model.estimate(samples, True, rough=True).distance
         turn = CANONICAL.leaning(lean)
         own = turned(samples, turn)
-        fit = _rough(model, own)
+        fit = model.estimate(own, True, rough=True)
         if fit.distance < least:
             orientation = candidate.orientation.leaning(lean)
             best, least = replace(candidate, orientation=orientation, samples=own), fit.distance
     return best
-
-
-def _rough(model: Model, samples: Samples, refined: bool = True) -> Estimate:
-    """An estimate that is good enough to tell readings apart."""
-    return estimate(model, samples, refined, ROUGH, stride=3)
 
 
 @dataclass(frozen=True)
@@ -126,26 +122,39 @@ class _View:
     samples: Samples
     odds: float
     probability: float
+    surface: Surface | None
 
     def candidate(self, refined: bool) -> Candidate:
         own = turned(self.samples, self.orientation)
-        fit = _rough(self.model, own, refined)
+        whole = self.surface and self.surface.turned(self.orientation)
+        fit = self.model.estimate(own, refined, rough=True, surface=whole)
         return Candidate(self.model, self.orientation, own, self.odds, self.probability, fit)
 
 
 def _views(
-    models: Sequence[Model], samples: dict[int, Samples], orientations: Sequence[Orientation]
+    models: Sequence[Model],
+    samples: dict[int, Samples],
+    orientations: Sequence[Orientation],
+    surface: Surface | None,
 ) -> list[_View]:
-    """All readings with their probabilities, the likeliest first."""
+    """All readings with their probabilities, the likeliest first.
+
+    Those of a model that turns freely are one: of the likeliest orientation, with the sum of the
+    probabilities.
+    """
     odds = [m.discriminator.odds(samples[m.points].points, orientations) for m in models]
     customary = np.log([CUSTOM.get(way, 1.0) for way in orientations])
     worth = np.stack([o - m.limit_odds for o, m in zip(odds, models, strict=True)]) + customary
     share = np.exp(worth - worth.max())
     share /= share.sum()
+    for row, model in zip(share, models, strict=True):
+        if model.turns_freely:
+            row[:] = np.where(np.arange(len(row)) == row.argmax(), row.sum(), 0.0)
     views = [
-        _View(model, way, samples[model.points], float(odds[m][w]), float(share[m, w]))
+        _View(model, way, samples[model.points], float(odds[m][w]), float(share[m, w]), surface)
         for m, model in enumerate(models)
         for w, way in enumerate(orientations)
+        if not model.turns_freely or share[m, w] > 0.0
     ]
     return sorted(views, key=lambda view: -view.probability)
 

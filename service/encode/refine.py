@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service import deadline
+from service.encode.affineoutputs import positive
 from service.encode.distance import Cloud
-from service.encode.model import positive
 from service.encode.residuals import Matcher, MovingSamples, normal_equations
 from service.template.affine import AffineTemplate
 

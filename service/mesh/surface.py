@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from service.errors import InvalidMesh
+from service.mesh.frame import CANONICAL, Orientation
 
 RADIUS = 0.6
 """Radius of the sphere that every normalised cloud just fits into (section 4.1 of the paper)."""
@@ -28,6 +29,32 @@ class Samples:
     normals: NDArray[np.float64]
     faces: NDArray[np.int64]
     barycentric: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A mesh, in which samples lie.
+
+    Attributes:
+        vertices: ``[V, 3]`` in its own frame.
+        faces: ``[F, 3]``.
+        metre: its length in the unit of the vertices, as far as the file or the client tells.
+        orientation: of the frame.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    metre: float | None = None
+    orientation: Orientation = CANONICAL
+
+    def turned(self, orientation: Orientation) -> Surface:
+        """The same, its frame taken for one of that orientation."""
+        return replace(self, orientation=orientation)
+
+    @property
+    def canonical(self) -> NDArray[np.float64]:
+        """``[V, 3]`` vertices in the canonical frame."""
+        return self.orientation.to_canonical(self.vertices)
 
 
 def sample_surface(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,10 +12,12 @@ import pytest
 from numpy.typing import NDArray
 from onnx import TensorProto, helper
 from plain_chair import PLAIN
+from six_boxes import ANSWER, SIX_BOXES
 
 import service
 from service.encode.distance import Cloud
-from service.encode.model import Model, load_models
+from service.encode.model import Model, file_digest, golden_cloud, load_models
+from service.encode.session import EncoderSession
 from service.mesh.surface import Normalization, Samples, sample_surface
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
@@ -124,3 +127,27 @@ def write_discriminator() -> WriteDiscriminator:
         return path
 
     return write
+
+
+@pytest.fixture
+def folder(
+    tmp_path: Path,
+    write_network: WriteNetwork,
+    write_discriminator: WriteDiscriminator,
+    chair: AffineTemplate,
+) -> Path:
+    """A models folder with a chair of six boxes whose network answers `ANSWER`."""
+    network = write_network(tmp_path / "chair.onnx", ANSWER, (1, 100, 3))
+    discriminator = write_discriminator(tmp_path / "chair.discriminator.onnx")
+    golden = EncoderSession(network).run(golden_cloud(chair, 100))
+    card = {
+        "name": "chair",
+        "version": "1.2.3",
+        "digest": file_digest(network),
+        "golden": golden.tolist(),
+        "discriminator": {"digest": file_digest(discriminator)},
+        "calibration": {"limit_distance": 0.03, "limit_odds": 1.0},
+    }
+    (tmp_path / "chair.json").write_text(json.dumps(card), "utf-8")
+    (tmp_path / "chair.yaml").write_text(SIX_BOXES, "utf-8")
+    return tmp_path

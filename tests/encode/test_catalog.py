@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+import service.template
 from service.encode.catalog import SUFFIXES, Catalog
 from service.encode.model import SHIPPED, Model, file_digest, load_models
 from service.errors import ModelFault
@@ -129,3 +130,15 @@ def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
 
 def test_the_shipped_models_all_verify() -> None:
     assert Catalog(lambda: load_models(SHIPPED), None, 1).load().faults == ()
+
+
+def test_own_bodies_work_with_the_operators_body_file(body_folder: Path, tmp_path: Path) -> None:
+    mine = tmp_path / "mine.npz"
+    shutil.copy(Path(service.template.__file__).parent / "human.npz", mine)
+    looks = Catalog(lambda: {}, body_folder, 1, mine)
+    first = looks.load()
+    assert list(first.models) == ["human"]
+    mine.write_bytes(b"no body")
+    second = looks.load()
+    assert [fault.code for fault in second.faults] == ["body_model"]
+    assert second.models["human"] is first.models["human"]

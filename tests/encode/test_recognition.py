@@ -1,14 +1,17 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from service.encode import recognition
-from service.encode.model import Model
+from service.encode.model import Model, load_models
 from service.encode.recognition import LISTED, recognise, straightened, turned
 from service.mesh.frame import CANONICAL, Orientation, orientations
 from service.mesh.surface import Samples, sample_surface
 from service.template.affine import AffineTemplate
+from service.template.skinned import Body, SkinnedTemplate
 
 SEVERAL = [
     Orientation("+z", "-y"),
@@ -154,3 +157,17 @@ def test_faces_that_are_wound_the_wrong_way_round_do_no_harm(
     assert wrong.estimate.inside_out
     assert not right.estimate.inside_out
     np.testing.assert_array_equal(wrong.estimate.parameters, right.estimate.parameters)
+
+
+@pytest.mark.parametrize("orientation", SEVERAL[:2], ids=lambda o: f"{o.up}{o.front}")
+def test_all_ways_of_turning_a_body_are_one_reading(
+    human: SkinnedTemplate, strider: Body, body_folder: Path, orientation: Orientation
+) -> None:
+    model = load_models(body_folder)["human"]
+    rng = np.random.default_rng(0)
+    samples = sample_surface(human.decode(strider), human.faces, model.points, rng)
+    lying = laid(samples, orientation)
+    (only,) = recognise([model], {model.points: lying}, orientations(), refined=False)
+    assert only.orientation == orientation
+    assert only.probability == pytest.approx(1.0)
+    assert straightened(only) is only

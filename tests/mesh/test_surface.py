@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from service.errors import InvalidMesh
-from service.mesh.surface import RADIUS, Normalization, Samples, sample_surface
+from service.mesh.frame import Orientation
+from service.mesh.surface import RADIUS, Normalization, Samples, Surface, sample_surface
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
 
@@ -144,3 +145,12 @@ def test_labels_scale_with_the_shape(chair: AffineTemplate) -> None:
         normalization.apply(vertices),
         atol=1e-12,
     )
+
+
+def test_a_surface_knows_its_canonical_vertices() -> None:
+    surface = Surface(VERTICES, FACES, metre=100.0)
+    assert surface.canonical is VERTICES
+    turned = surface.turned(Orientation("+z", "-y"))
+    np.testing.assert_array_equal(turned.canonical[2], [0.0, 0.0, -1.0])
+    np.testing.assert_array_equal(turned.canonical[5], [5.0, 2.0, 0.0])
+    assert turned.metre == 100.0

@@ -1,0 +1,73 @@
+"""A body's upload as glTF and its viewers skin it: joints, weights and inverse bind matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.bodyinference import BodyInference
+from service.deform import skinbinding
+from service.template.anatomy import JOINTS, PARENTS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """An upload's own vertices, bound to a skeleton in the pose that it was inferred to have.
+
+    All is in the upload's own frame and coordinates.  A vertex goes to
+    ``sum(weight * world @ inverse_bind @ [vertex, 1])``, where a joint's ``world`` is its parent's
+    times its own rotation and its offset from there; the root's parent is ``frame``.  The rotations
+    are the body's parameters, so that their sliders pose it as edits of the angles do.
+
+    Attributes:
+        names: of the 24 joints.
+        parents: index of each joint's parent, -1 for the root.
+        frame: ``[3, 3]`` rotation from the canonical frame to the upload's.
+        joints: ``[24, 3]`` where they are.
+        rotations: ``[24, 3, 3]`` of each joint in its parent's frame.
+        offsets: ``[24, 3]`` of each joint in its parent's frame, the root's in ``frame``'s.
+        inverse_bind: ``[24, 4, 4]``.
+        indices, weights: ``[V, 4]`` of the joints that move a vertex; the weights are one in sum.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    frame: Array
+    joints: Array
+    rotations: Array
+    offsets: Array
+    inverse_bind: Array
+    indices: NDArray[np.int64]
+    weights: Array
+
+    @classmethod
+    def of(cls, found: BodyInference) -> Skeleton:
+        """The skeleton of an inferred body."""
+        template, body = found.model.template, found.fit.body
+        frame = found.best.orientation.rotation.T
+        joints = found.own_joints(body)
+        binds = skinbinding.joint_matrices(template, body)
+        binds[:, :3, :3] = frame @ binds[:, :3, :3]
+        binds[:, :3, 3] = joints
+        above = np.eye(4)
+        above[:3, :3] = frame
+        inverses = np.asarray(np.linalg.inv(binds), dtype=np.float64)
+        parents = np.concatenate([above.T[None], inverses[list(PARENTS[1:])]])
+        nodes = parents @ binds
+        skin = skinbinding.bind(found.vertices, found.mesh.faces, template, body)
+        order = np.argsort(-skin.weights, axis=1, kind="stable")[:, : skinbinding.INFLUENCES]
+        return cls(
+            names=JOINTS,
+            parents=PARENTS,
+            frame=frame,
+            joints=joints,
+            rotations=nodes[:, :3, :3],
+            offsets=nodes[:, :3, 3],
+            inverse_bind=inverses,
+            indices=order,
+            weights=np.take_along_axis(skin.weights, order, axis=1),
+        )
