@@ -129,7 +129,9 @@ def build_card(
 
 def describe_data(shapes: list[RealisticShape]) -> dict[str, Any]:
     """What real shapes were used and under which licences."""
-    licences = Counter(str(shape.info.get("licence", "unknown")) for shape in shapes)
+    licences = Counter(
+        str(shape.info.get("licence") or shape.info.get("license") or "unknown") for shape in shapes
+    )
     held_out = sum(shape.held_out for shape in shapes)
     return {
         "synthetic": "drawn from the ranges on the fly, labelled by construction",

@@ -25,12 +25,16 @@ from model_export.bodytruth import (
 from model_export.config import SHIPPED
 from model_export.discriminate import Data, assess, build
 from model_export.export import PAPER, describe_data, random_clouds
+from model_export.meshnet import MeshNet
 from model_export.realistic import RealisticShape
 from model_export.samples import clouds_of
+from model_export.train_mesh import median_error
+from model_export.train_mesh import write_onnx as write_mesh_onnx
 from service.encode.basemodel import file_digest
 from service.encode.bodymodel import BodyModel, golden_cloud
 from service.encode.bodyoutputs import ANCHORS
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
+from service.encode.meshencoder import MESH_SUFFIX
 from service.encode.session import EncoderSession
 from service.template.bodyfile import load_body
 from service.template.skinned import SkinnedTemplate
@@ -115,6 +119,29 @@ def build_card(
     }
 
 
+def export_mesh(folder: Path, template: SkinnedTemplate, path: Path) -> dict[str, Any]:
+    """Write a run's mesh encoder beside the encoder's ``path``; the card's ``mesh_encoder``.
+
+    Raises:
+        ValueError: when it was trained with another body.
+    """
+    state = torch.load(folder / "checkpoint.pt", map_location="cpu")
+    if state["template"] != template.digest:
+        raise ValueError(f"the mesh encoder in {folder} was trained with another body")
+    network = MeshNet(template.faces, len(template.rest))
+    network.load_state_dict(state["network"])
+    file = path.with_suffix(MESH_SUFFIX)
+    write_mesh_onnx(network, len(template.rest), file)
+    return {
+        "digest": file_digest(file),
+        "steps": state["step"],
+        "batch": state["batch"],
+        "hours": round(state["seconds"] / 3600, 2),
+        "place": state["place"],
+        "median_turn_error_degrees": round(median_error(network, template, 20), 1),
+    }
+
+
 def measure(model: BodyModel, shapes: list[RealisticShape], count: int) -> dict[str, Any]:
     """Errors on synthetic bodies, and on the characters that were not trained on, by source."""
     naked = replace(Garments.none(), tilt=0.5)
@@ -149,6 +176,10 @@ def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m model_export.export_body", description=__doc__)
     parser.add_argument("--run", type=Path, default=Path("runs/human"), help="folder of the run")
+    parser.add_argument(
+        "--mesh-run", type=Path, default=Path("runs/human-mesh"),
+        help="folder of the mesh encoder's run; none is exported where there is none",
+    )  # fmt: skip
     parser.add_argument("--body", type=Path, help="body file (default: the shipped body)")
     parser.add_argument("--realistic", type=Path, help="real bodies, to measure on")
     parser.add_argument("--cache", type=Path, default=Path("cache"), help="for sampled clouds")
@@ -186,6 +217,8 @@ def main() -> None:
     else:
         second = path.with_suffix(DISCRIMINATOR_SUFFIX)
         card["discriminator"] = build(template, data, arguments.steps, second, arguments.cache)
+    if (arguments.mesh_run / "checkpoint.pt").is_file():
+        card["mesh_encoder"] = export_mesh(arguments.mesh_run, template, path)
     model = BodyModel(card, template, path, threads=1)
     assess(model, card, data, arguments.cache)
     card["metrics"] = measure(model, shapes, arguments.count)

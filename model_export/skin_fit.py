@@ -11,6 +11,8 @@ from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
 from service.deform.normals import vertex_normals
+from service.encode.bodymodel import BodyModel
+from service.mesh.surface import sample_surface
 from service.template.anatomy import JOINTS
 from service.template.skinned import Body, SkinnedTemplate, body_of
 
@@ -30,6 +32,23 @@ FAR = 0.07
 def fit_joints(template: SkinnedTemplate) -> Fit:
     """A fit that is told the joints: first to them, then to the surface beside them."""
     return lambda vertices, faces, joints: _fit(template, vertices, faces, joints)
+
+
+def served_fit(model: BodyModel) -> Fit:
+    """The service's own fit, which sees the surface alone."""
+
+    def fit(vertices: Array, faces: Index, joints: Array) -> Body:
+        samples = sample_surface(vertices, faces, model.points, np.random.default_rng(0))
+        found = model.estimate(samples, refined=True)
+        frame = found.normalization
+        # Back from the normalised frame: places are scaled by 1 / s about its centre.
+        return replace(
+            found.body,
+            scale=found.body.scale / frame.scale,
+            translation=found.body.translation / frame.scale + frame.center,
+        )
+
+    return fit
 
 
 def _fit(template: SkinnedTemplate, vertices: Array, faces: Index, joints: Array) -> Body:

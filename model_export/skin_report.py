@@ -1,12 +1,12 @@
 """How edits of bodies compare with the characters' own rigs:
 ``python -m model_export.skin_report --originals DIR``.
 
-Rigged characters are posed, a body is fitted, and single joints are turned by 30 and 60 degrees
-either way, by the rig and by each transfer rule.  Distances between the results (V2V) are means
-over the vertices, in millimetres at a stature of 1.7 m.  Turns are about the fitted joint; about
-it, moved by the mean offset of the rig's joints in the files of one convention of names, which
-takes out that rigs define joints otherwise; and about the rig's own, which leaves what is due to
-weights.  An edge is torn when it ends up longer than 4 times what it is under the rig.
+Rigged characters are posed, a body is fitted as the service does, and single joints are turned by
+30 and 60 degrees either way, by the rig and by each transfer rule.  Distances between the results
+(V2V) are means over the vertices, in millimetres at a stature of 1.7 m.  Turns are about the fitted
+joint; about it, moved by the mean offset of the rig's joints in the files of one convention of
+names, which takes out that rigs define joints otherwise; and about the rig's own, which leaves what
+is due to weights.  An edge is torn when it ends up longer than 4 times what it is under the rig.
 """
 
 from __future__ import annotations
@@ -22,11 +22,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from model_export.config import SHIPPED
 from model_export.rigs import POSES, Rig, posed, read_rig
-from model_export.skin_fit import Fit, fit_joints
+from model_export.skin_fit import Fit, fit_joints, served_fit
 from service.deform import bodypaper, skinbinding
+from service.encode.bodymodel import BodyModel
+from service.encode.model import load_models
 from service.template.anatomy import JOINTS, PARENTS, descendants
-from service.template.bodyfile import load_body
 from service.template.skinned import Body, SkinnedTemplate
 from service.template.skinning import pose_joints
 
@@ -213,12 +215,14 @@ def main() -> None:
     parser.add_argument("--originals", type=Path, required=True, help="folder of rigged GLBs")
     parser.add_argument("--poses", nargs="+", choices=list(POSES), default=list(POSES))
     parser.add_argument("--body", type=Path, help="another body in SMPL's format")
+    parser.add_argument("--told", action="store_true", help="tell the fit where the joints are")
     parser.add_argument("--out", type=Path, help="JSON file of all scores")
     options = parser.parse_args()
-    template = load_body(options.body)
-    scores = report(
-        sorted(options.originals.glob("*.glb")), template, fit_joints(template), options.poses
-    )
+    model = load_models(SHIPPED, body=options.body)["human"]
+    assert isinstance(model, BodyModel)
+    fit = fit_joints(model.template) if options.told else served_fit(model)
+    files = sorted(options.originals.glob("*.glb"))
+    scores = report(files, model.template, fit, options.poses)
     keys: list[Callable[[Score], str]] = [
         lambda score: "all",
         lambda score: score.pose,

@@ -40,6 +40,10 @@ class Fit(Protocol):
     def inside_out(self) -> bool:
         """Whether the upload's faces are wound the wrong way round."""
 
+    @property
+    def turn(self) -> NDArray[np.float64]:
+        """``[3, 3]`` how the shape is turned in the canonical frame."""
+
 
 class Model(ABC):
     """A category that the service can infer and edit."""

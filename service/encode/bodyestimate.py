@@ -80,6 +80,11 @@ class BodyEstimate:
     normalization: Normalization
     inside_out: bool
 
+    @property
+    def turn(self) -> Array:
+        """``[3, 3]`` the global orientation."""
+        return np.asarray(self.body.rotations[0])
+
 
 @dataclass(frozen=True)
 class _Reading:

@@ -72,6 +72,11 @@ class Estimate:
     normalization: Normalization
     inside_out: bool
 
+    @property
+    def turn(self) -> Array:
+        """``[3, 3]``: none, for a fit that stands upright."""
+        return np.eye(3)
+
 
 def estimate(
     model: AffineEncoder,

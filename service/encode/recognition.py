@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from service.encode.basemodel import STEEPNESS, Fit, Model
 from service.encode.straighten import leans
 from service.mesh.frame import CANONICAL, Orientation
+from service.mesh.frame import orientations as all_orientations
 from service.mesh.surface import Normalization, Samples, Surface
 
 CUSTOM = {CANONICAL: 3.0, Orientation("+z", "-y"): 1.5}
@@ -21,6 +23,8 @@ FINALISTS = 4
 """but no more than these."""
 STRAIGHTER = 1.05
 """A lean is taken out where the fit's distance is then at most so many times as long."""
+NEARER = 0.1
+"""A fit is told in another orientation if the trace of its turn is larger there by so much."""
 LISTED = 3
 """Readings that are told of at least, where there are so many."""
 
@@ -88,10 +92,24 @@ def recognise(
     else:
         fitted = _weighed([view.candidate(refined=True) for view in views[:finalists]])
         listed = [*fitted, *(view.candidate(refined=False) for view in views[finalists:LISTED])]
-    best = straightened(listed[0])
+    best = straightened(settled(listed[0], samples, orientations))
     whole = surface and surface.turned(best.orientation)
     answer = best.model.estimate(best.samples, refined, surface=whole)
     return [replace(best, estimate=answer), *listed[1:]]
+
+
+def settled(
+    candidate: Candidate, samples: dict[int, Samples], orientations: Sequence[Orientation]
+) -> Candidate:
+    """The candidate in the orientation, of those it may have, that its fit stands upright in."""
+    model = candidate.model
+    own = candidate.orientation.rotation.T @ candidate.estimate.turn
+    upright = [float(np.trace(way.rotation @ own)) for way in orientations]
+    way = orientations[int(np.argmax(upright))]
+    now = float(np.trace(candidate.estimate.turn))
+    if max(upright) < now + NEARER:
+        return candidate
+    return replace(candidate, orientation=way, samples=turned(samples[model.points], way))
 
 
 def straightened(candidate: Candidate) -> Candidate:
@@ -139,24 +157,38 @@ def _views(
 ) -> list[_View]:
     """All readings with their probabilities, the likeliest first.
 
-    Those of a model that turns freely are one: of the likeliest orientation, with the sum of the
-    probabilities.
+    A model that turns freely has one reading: of the likeliest orientation, with the odds of the
+    likeliest way of all to turn the upload.
     """
-    odds = [m.discriminator.odds(samples[m.points].points, orientations) for m in models]
-    customary = np.log([CUSTOM.get(way, 1.0) for way in orientations])
-    worth = np.stack([o - m.limit_odds for o, m in zip(odds, models, strict=True)]) + customary
+    readings: list[tuple[Model, Orientation, float, float]] = []
+    for model in models:
+        cloud = samples[model.points].points
+        if not model.turns_freely:
+            odds = model.discriminator.odds(cloud, orientations)
+            worths = odds - model.limit_odds + _custom(orientations)
+            readings += [
+                (model, way, float(own), float(worth))
+                for way, own, worth in zip(orientations, odds, worths, strict=True)
+            ]
+            continue
+        ways = all_orientations()
+        odds = model.discriminator.odds(cloud, ways)
+        worths = odds - model.limit_odds + _custom(ways)
+        way = max(orientations, key=lambda way: worths[ways.index(way)])
+        readings.append((model, way, float(odds.max()), float(np.logaddexp.reduce(worths))))
+    worth = np.array([reading[3] for reading in readings])
     share = np.exp(worth - worth.max())
     share /= share.sum()
-    for row, model in zip(share, models, strict=True):
-        if model.turns_freely:
-            row[:] = np.where(np.arange(len(row)) == row.argmax(), row.sum(), 0.0)
     views = [
-        _View(model, way, samples[model.points], float(odds[m][w]), float(share[m, w]), surface)
-        for m, model in enumerate(models)
-        for w, way in enumerate(orientations)
-        if not model.turns_freely or share[m, w] > 0.0
+        _View(model, way, samples[model.points], odds, float(probability), surface)
+        for (model, way, odds, _), probability in zip(readings, share, strict=True)
     ]
     return sorted(views, key=lambda view: -view.probability)
+
+
+def _custom(ways: Sequence[Orientation]) -> NDArray[np.float64]:
+    """``[k]`` logarithms of `CUSTOM`."""
+    return np.log([CUSTOM.get(way, 1.0) for way in ways])
 
 
 def _weighed(candidates: list[Candidate]) -> list[Candidate]:

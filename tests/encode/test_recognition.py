@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from service.encode import recognition
 from service.encode.model import Model, load_models
-from service.encode.recognition import LISTED, recognise, straightened, turned
+from service.encode.recognition import LISTED, recognise, settled, straightened, turned
 from service.mesh.frame import CANONICAL, Orientation, orientations
 from service.mesh.surface import Samples, sample_surface
 from service.template.affine import AffineTemplate
@@ -171,3 +172,37 @@ def test_all_ways_of_turning_a_body_are_one_reading(
     assert only.orientation == orientation
     assert only.probability == pytest.approx(1.0)
     assert straightened(only) is only
+
+
+def test_a_body_is_told_of_in_the_orientation_that_it_stands_upright_in(
+    human: SkinnedTemplate, strider: Body, body_folder: Path
+) -> None:
+    model = load_models(body_folder)["human"]
+    rng = np.random.default_rng(0)
+    samples = sample_surface(human.decode(strider), human.faces, model.points, rng)
+    (right,) = recognise([model], {model.points: samples}, orientations(), refined=False)
+    lying = Orientation("+z", "-y")
+    mistaken = replace(right, orientation=lying, samples=turned(samples, lying))
+    fit = model.estimate(mistaken.samples, refined=False)
+    mistaken = replace(mistaken, estimate=fit)
+    assert np.trace(fit.turn) < 2.0
+    mended = settled(mistaken, {model.points: samples}, orientations())
+    assert mended.orientation == right.orientation
+    np.testing.assert_allclose(mended.samples.points, right.samples.points)
+    assert settled(right, {model.points: samples}, orientations()) is right
+    assert settled(mistaken, {model.points: samples}, [lying]) is mistaken
+
+
+def test_a_body_that_lies_in_the_clients_frame_is_as_much_a_body(
+    human: SkinnedTemplate, strider: Body, body_folder: Path
+) -> None:
+    model = load_models(body_folder)["human"]
+    rng = np.random.default_rng(0)
+    samples = sample_surface(human.decode(strider), human.faces, model.points, rng)
+    found = [
+        recognise([model], {model.points: samples}, [way], refined=True)[0]
+        for way in (CANONICAL, Orientation("+z", "-y"))
+    ]
+    assert found[0].odds == found[1].odds
+    assert found[1].estimate.distance == pytest.approx(found[0].estimate.distance, rel=0.2)
+    assert np.trace(found[1].estimate.turn) < 2.0 < np.trace(found[0].estimate.turn)

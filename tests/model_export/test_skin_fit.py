@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model_export.skin_fit import fit_joints
+from model_export.skin_fit import fit_joints, served_fit
+from service.encode.model import SHIPPED, load_models
 from service.template.anatomy import JOINTS
 from service.template.bodyfile import load_body
 
@@ -24,3 +25,13 @@ def test_a_fit_that_is_told_the_joints_is_near(missing):
     off = np.linalg.norm(TEMPLATE.posed_joints(fit) - TEMPLATE.posed_joints(body), axis=1)
     assert off.mean() < 1.0
     assert fit.scale == pytest.approx(100.0, rel=0.05)
+
+
+def test_the_services_own_fit_is_in_the_files_frame():
+    model = load_models(SHIPPED)["human"]
+    rest = TEMPLATE.at_rest()
+    body = replace(rest, scale=100.0, translation=np.array([3.0, 90.0, 5.0]))
+    unknown = np.full((len(JOINTS), 3), np.nan)
+    fit = served_fit(model)(TEMPLATE.decode(body), TEMPLATE.faces, unknown)
+    off = np.linalg.norm(TEMPLATE.posed_joints(fit) - TEMPLATE.posed_joints(body), axis=1)
+    assert off.mean() < 2.0
