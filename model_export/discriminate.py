@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import logging
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +28,7 @@ from model_export.config import SHIPPED
 from model_export.distractors import heaps, other_shapes
 from model_export.disturb import disturb
 from model_export.networks import Discriminator, fold_batch_norm
+from model_export.onnxfile import write_network
 from model_export.realistic import RealisticShape, find_shapes, normalise
 from model_export.samples import clouds_of, synthetic_samples
 from model_export.synthetic import Augmentation, SyntheticShapes
@@ -185,20 +184,9 @@ def write_card(card: dict[str, Any], path: Path) -> None:
 
 def write_onnx(network: Discriminator, path: Path) -> None:
     """Write a network that takes any number of views ``[k, POINTS, 3]`` at a time."""
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        torch.onnx.export(
-            fold_batch_norm(network),
-            (torch.zeros(2, POINTS, 3),),
-            str(path),
-            input_names=["views"],
-            output_names=["odds"],
-            dynamic_shapes=({0: torch.export.Dim("count", min=1, max=len(ROTATIONS))},),
-            dynamo=True,
-            external_data=False,
-            verbose=False,
-        )
+    count = torch.export.Dim("count", min=1, max=len(ROTATIONS))
+    example, names = torch.zeros(2, POINTS, 3), ("views", "odds")
+    write_network(fold_batch_norm(network), example, path, names, ({0: count},))
 
 
 def measure(

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import argparse
 import json
-import logging
 import shutil
-import warnings
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+from torch import nn
 
 from model_export.calibrate import sigma_scales
 from model_export.config import SHIPPED, from_plain
 from model_export.discriminate import Data, assess, build
 from model_export.evaluate import real_fits, synthetic_table
 from model_export.networks import Encoder, build_encoder, fold_batch_norm
+from model_export.onnxfile import write_network
 from model_export.realistic import RealisticShape, find_shapes
 from model_export.refit import refit
 from model_export.report import write_report
@@ -49,22 +49,11 @@ def load_encoder(state: dict[str, Any]) -> Encoder:
 
 def write_onnx(encoder: Encoder, points: int, path: Path) -> None:
     """Write the encoder for one cloud of a fixed size: input ``points``, output ``outputs``."""
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        torch.onnx.export(
-            fold_batch_norm(encoder),
-            (torch.zeros(1, points, 3),),
-            str(path),
-            input_names=["points"],
-            output_names=["outputs"],
-            dynamo=True,
-            external_data=False,
-            verbose=False,
-        )
+    example = torch.zeros(1, points, 3)
+    write_network(fold_batch_norm(encoder), example, path, ("points", "outputs"))
 
 
-def check_onnx(encoder: Encoder, path: Path, clouds: list[np.ndarray]) -> float:
+def check_onnx(encoder: nn.Module, path: Path, clouds: list[np.ndarray]) -> float:
     """Largest difference between torch and onnxruntime over the clouds.
 
     Raises:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import logging
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,7 @@ import numpy as np
 import torch
 
 from model_export.bodies import Garments
-from model_export.bodynet import BodyEncoder, spread_first
+from model_export.bodynet import BodyEncoder
 from model_export.bodytruth import (
     BodyError,
     body_errors,
@@ -24,22 +22,22 @@ from model_export.bodytruth import (
 )
 from model_export.config import SHIPPED
 from model_export.discriminate import Data, assess, build
-from model_export.export import PAPER, describe_data, random_clouds
+from model_export.export import PAPER, check_onnx, describe_data, random_clouds
 from model_export.meshnet import MeshNet
+from model_export.onnxfile import write_network
 from model_export.realistic import RealisticShape
 from model_export.samples import clouds_of
 from model_export.train_mesh import median_error
 from model_export.train_mesh import write_onnx as write_mesh_onnx
 from service.encode.basemodel import file_digest
 from service.encode.bodymodel import BodyModel, golden_cloud
-from service.encode.bodyoutputs import ANCHORS
+from service.encode.bodyoutputs import ANCHORS, spread_first
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
 from service.encode.meshencoder import MESH_SUFFIX
 from service.encode.session import EncoderSession
 from service.template.bodyfile import load_body
 from service.template.skinned import SkinnedTemplate
 
-TOLERANCE = 1e-4
 PARTIAL = replace(Garments(), partial=0.0)
 """Test bodies in clothes, with noise and holes, seen from all sides."""
 
@@ -54,38 +52,8 @@ def load_encoder(state: dict[str, Any]) -> BodyEncoder:
 
 def write_onnx(encoder: BodyEncoder, points: int, path: Path) -> None:
     """Write the encoder for one cloud of a fixed size: input ``points``, output ``outputs``."""
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        torch.onnx.export(
-            encoder,
-            (0.2 * torch.randn(1, points, 3, generator=torch.Generator().manual_seed(0)),),
-            str(path),
-            input_names=["points"],
-            output_names=["outputs"],
-            dynamo=True,
-            external_data=False,
-            verbose=False,
-        )
-
-
-def check_onnx(encoder: BodyEncoder, path: Path, clouds: list[np.ndarray]) -> float:
-    """Largest difference between torch and onnxruntime over the clouds.
-
-    Raises:
-        ValueError: when it is not below 1e-4.
-    """
-    session = EncoderSession(path)
-    gap = 0.0
-    for cloud in clouds:
-        points = torch.as_tensor(cloud, dtype=torch.float32)[None]
-        points = points[:, spread_first(points, ANCHORS)[0]]
-        with torch.no_grad():
-            expected = encoder(points)[0].numpy()
-        gap = max(gap, float(np.abs(session.run(points[0].numpy()) - expected).max()))
-    if not gap < TOLERANCE:
-        raise ValueError(f"the exported network differs from the trained one by {gap:.2g}")
-    return gap
+    example = 0.2 * torch.randn(1, points, 3, generator=torch.Generator().manual_seed(0))
+    write_network(encoder, example, path, ("points", "outputs"))
 
 
 def build_card(
@@ -207,7 +175,7 @@ def main() -> None:
     data = Data.of(arguments.realistic, arguments.others, arguments.but)
     shapes = list(data.shapes)
     clouds = random_clouds(points, 20) + clouds_of(shapes[:20], arguments.cache, points)
-    gap = check_onnx(encoder, path, clouds)
+    gap = check_onnx(encoder, path, [cloud[spread_first(cloud, ANCHORS)] for cloud in clouds])
     print(f"onnxruntime and torch differ by {gap:.1e} over {len(clouds)} clouds")
     card = build_card(template, state, path, arguments.version)
     card["data"] = describe_data(shapes)

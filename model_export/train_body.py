@@ -179,8 +179,7 @@ class BodyTrainer:
     def _place(self) -> str:
         if self.device.type == "cuda":
             return torch.cuda.get_device_name(self.device)
-        threads = torch.get_num_threads()
-        return f"CPU, {threads} thread" + ("s" if threads > 1 else "")
+        return f"CPU, threads: {torch.get_num_threads()}"
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a checkpoint of the same configuration."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import logging
 import math
 import time
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +16,7 @@ from tqdm import tqdm
 
 from model_export.bodylosses import geodesic_squared
 from model_export.meshnet import MeshNet
+from model_export.onnxfile import write_network
 from model_export.poses import Poses
 from service.encode.alignment import align
 from service.encode.meshencoder import torso_weights
@@ -124,7 +123,7 @@ def train(
                 "step": step + 1,
                 "batch": batch,
                 "seconds": time.monotonic() - began,
-                "place": f"CPU, {torch.get_num_threads()} threads",
+                "place": f"CPU, threads: {torch.get_num_threads()}",
             }
             torch.save(state, folder / "checkpoint.part")
             (folder / "checkpoint.part").replace(folder / "checkpoint.pt")
@@ -137,19 +136,7 @@ def train(
 
 def write_onnx(network: MeshNet, count: int, path: Path) -> None:
     """Write the network: input ``vertices [1, V, 3]``, output ``outputs``."""
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        torch.onnx.export(
-            network.eval(),
-            (0.1 * torch.randn(1, count, 3),),
-            str(path),
-            input_names=["vertices"],
-            output_names=["outputs"],
-            dynamo=True,
-            external_data=False,
-            verbose=False,
-        )
+    write_network(network, 0.1 * torch.randn(1, count, 3), path, ("vertices", "outputs"))
 
 
 @torch.no_grad()
