@@ -94,7 +94,7 @@ def main() -> None:
         return
     pairs = zip(chosen(shapes, len(EDITS)), EDITS, strict=True)
     panels = [panel for pair in pairs for panel in edit_panels(model, *pair)]
-    save_sheet(panels, arguments.out, columns=8)
+    save_sheet(panels, arguments.out, columns=8, aspect=0.8, same_scale=True)
 
 
 if __name__ == "__main__":
