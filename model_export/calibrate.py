@@ -18,6 +18,9 @@ LIMIT = 95
 DRAWN_FARTHER, DRAWN_ODDS = 3.0, 3.0
 """How much farther real shapes lie than noise-free template shapes, and how much lower their odds
 are, where there are none to see."""
+DRESSED = 1.5
+"""How much farther people in coats and skirts are from the fitted body than the real ones at hand,
+who mostly come in close-fitting clothes."""
 
 FEWEST = 15
 """Measured shapes from which on errors are counted."""
@@ -36,16 +39,16 @@ def calibrate(
         model: the category; its card need not have a calibration yet.
         shapes: ordinary real shapes, canonically oriented; may be none.  Odds are taken from those
             held out, since a discriminator is too sure of what it has learned.
-        drawn: samples of template shapes, for a category without real ones; those of bodies, who
-            come in more poses and clothes than real ones at hand, count in any case.
+        drawn: samples of template shapes, for a category without real ones.  Those of bodies, who
+            come in more poses than real ones at hand, tell what their odds are in any case.
     """
     samples = [_samples(model, shape) for shape in shapes] or list(drawn)
     unseen = [s for s, shape in zip(samples, shapes, strict=False) if shape.held_out] or samples
+    farther, lower = (1.0, 0.0) if shapes else (DRAWN_FARTHER, DRAWN_ODDS)
     if isinstance(model, BodyModel) and shapes:
-        samples, unseen = [*samples, *drawn], [*unseen, *drawn]
+        farther, unseen = DRESSED, [*unseen, *drawn]
     distances = [model.estimate(s, refined=True).distance for s in samples]
     odds = [model.discriminator.odds(s.points, [CANONICAL])[0] for s in unseen]
-    farther, lower = (1.0, 0.0) if shapes else (DRAWN_FARTHER, DRAWN_ODDS)
     return {
         "shapes": len(shapes),
         "limit_distance": round(farther * float(np.percentile(distances, LIMIT)), 5),

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import torch
-import yaml
 from tqdm import tqdm
 
-from model_export.bodies import BodyBatch, Garments, SyntheticBodies
-from model_export.bodylosses import BodyAnswer, BodyLosses, BodyWeights
+from model_export.bodies import BodyBatch, SyntheticBodies
+from model_export.bodyconfig import BodyConfig, load_body_config
+from model_export.bodylosses import BodyAnswer, BodyLosses
 from model_export.bodynet import BodyEncoder, spread_first
 from model_export.realistic import RealisticShapes
 from service.encode.bodyoutputs import ANCHORS
@@ -27,65 +27,6 @@ from service.template.skinning import pose_joints
 VALIDATION_SEED = 20_000_003
 STATURE = 1.7
 """Metres: joint errors are given for a body that tall."""
-
-
-@dataclasses.dataclass(frozen=True)
-class BodyConfig:
-    """Everything that decides a run.
-
-    Attributes:
-        steps: optimiser steps.
-        batch: bodies a step.
-        real_share: share of the batch that is real.
-        points: a cloud.
-        learning_rate: the largest, of AdamW; it rises linearly, and falls along a cosine.
-        warmup: steps that it rises.
-        decay: of the weights.
-        precision: ``fp32``, or ``bf16`` arithmetic in the network.
-        width, depth, neighbours: of the encoder.
-        weights: of the losses.
-        garments: of synthetic bodies.
-        seed: of everything random.
-    """
-
-    steps: int = 4800
-    batch: int = 32
-    real_share: float = 0.125
-    points: int = 1024
-    learning_rate: float = 1e-3
-    warmup: int = 300
-    decay: float = 0.01
-    precision: str = "bf16"
-    width: int = 128
-    depth: int = 4
-    neighbours: int = 24
-    weights: BodyWeights = dataclasses.field(default_factory=BodyWeights)
-    garments: Garments = dataclasses.field(default_factory=Garments)
-    seed: int = 0
-
-
-def load_body_config(path: Path | None) -> BodyConfig:
-    """A configuration from a YAML file; None is the shipped model's.
-
-    Raises:
-        ValueError: for an entry that no setting is named after.
-    """
-    if path is None:
-        return BodyConfig()
-    entries = yaml.safe_load(path.read_text("utf-8")) or {}
-    unknown = set(entries) - {field.name for field in dataclasses.fields(BodyConfig)}
-    if unknown:
-        raise ValueError(f"{path}: no setting is named {sorted(unknown)[0]!r}")
-    return body_config(entries)
-
-
-def body_config(entries: dict[str, Any]) -> BodyConfig:
-    """A configuration from plain values, as files and checkpoints hold them."""
-    entries = dict(entries)
-    for name, kind in (("weights", BodyWeights), ("garments", Garments)):
-        if isinstance(entries.get(name), dict):
-            entries[name] = kind(**entries[name])
-    return BodyConfig(**entries)
 
 
 class BodyTrainer:

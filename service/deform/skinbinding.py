@@ -72,18 +72,6 @@ class SkinBinding:
         maps: Array = blended.reshape(-1, 3, 3) + np.eye(3)
         return maps
 
-    def skeleton(self, body: Body) -> tuple[Array, Array]:
-        """Joints ``[24, 3]`` of a body that the mesh was bound to, and the inverses ``[24, 4, 4]``
-        of their matrices.
-
-        A renderer moves vertices by the sum of ``weight * joint_matrices(now) @ inverse``.
-        """
-        matrices = joint_matrices(self.template, body)
-        inverses = np.tile(np.eye(4), (len(JOINTS), 1, 1))
-        inverses[:, :3, :3] = matrices[:, :3, :3].swapaxes(1, 2)
-        inverses[:, :3, 3:] = -inverses[:, :3, :3] @ matrices[:, :3, 3:]
-        return matrices[:, :3, 3], inverses
-
 
 def bind(
     vertices: Array, faces: NDArray[np.int64], template: SkinnedTemplate, body: Body

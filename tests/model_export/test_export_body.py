@@ -11,11 +11,12 @@ import pytest
 import torch
 
 from model_export import export_body
+from model_export.bodyconfig import BodyConfig
 from model_export.bodynet import BodyEncoder
 from model_export.export import TOLERANCE, check_onnx
 from model_export.meshnet import MeshNet
 from model_export.realistic import find_shapes
-from model_export.train_body import BodyConfig, BodyTrainer
+from model_export.train_body import BodyTrainer
 from service.encode.basemodel import file_digest
 from service.encode.bodymodel import BodyModel
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX

@@ -8,12 +8,11 @@ import torch
 import trimesh
 
 from model_export.bodies import Garments, SyntheticBodies
+from model_export.bodyconfig import BodyConfig
 from model_export.realistic import RealisticShapes
 from model_export.train_body import (
-    BodyConfig,
     BodyTrainer,
     joint_errors,
-    load_body_config,
     ordered,
     run,
 )
@@ -103,14 +102,3 @@ def test_errors_are_in_millimetres(human: SkinnedTemplate) -> None:
     assert 100 < errors["votes"] < 1500
     assert 100 < errors["posed"] < 1500
     assert 10 < errors["turn"] < 180
-
-
-def test_settings_come_from_a_file(tmp_path: Path) -> None:
-    path = tmp_path / "human.yaml"
-    path.write_text("steps: 7\ngarments: {cloth: 0.01}\nweights: {sim: 2.0}\n")
-    config = load_body_config(path)
-    assert (config.steps, config.garments.cloth, config.weights.sim) == (7, 0.01, 2.0)
-    assert load_body_config(None) == BodyConfig()
-    path.write_text("stepz: 7\n")
-    with pytest.raises(ValueError, match="stepz"):
-        load_body_config(path)
