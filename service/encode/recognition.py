@@ -175,7 +175,7 @@ def _views(
         odds = model.discriminator.odds(cloud, ways)
         worths = odds - model.limit_odds + _custom(ways)
         way = max(orientations, key=lambda way: worths[ways.index(way)])
-        readings.append((model, way, float(odds.max()), float(np.logaddexp.reduce(worths))))
+        readings.append((model, way, float(odds.max()), float(worths.max())))
     worth = np.array([reading[3] for reading in readings])
     share = np.exp(worth - worth.max())
     share /= share.sum()

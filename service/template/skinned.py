@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,17 +97,6 @@ class SkinnedTemplate:
     faces: NDArray[np.int64]
     shape_labels: tuple[str, ...]
     digest: str
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The parameter names, in order."""
-        return NAMES
-
-    @cached_property
-    def influences(self) -> tuple[NDArray[np.int64], Array]:
-        """``[V, 4]`` the joints that move a vertex most, and their weights."""
-        order = np.argsort(-self.weights, axis=1, kind="stable")[:, :4]
-        return order, np.take_along_axis(self.weights, order, axis=1)
 
     def shaped(self, shape: Array) -> tuple[Array, Array]:
         """``[V, 3]`` vertices and ``[24, 3]`` joints at rest for ``shape [S]``."""

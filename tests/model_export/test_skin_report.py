@@ -28,7 +28,8 @@ def own_rig(off: float = 0.0) -> Rig:
     joints = TEMPLATE.joints + np.array([0.0, off, 0.0])
     worlds = np.tile(np.eye(4), (24, 1, 1))
     worlds[:, :3, 3] = joints
-    order, weights = TEMPLATE.influences
+    order = np.argsort(-TEMPLATE.weights, axis=1, kind="stable")[:, :4]
+    weights = np.take_along_axis(TEMPLATE.weights, order, axis=1)
     return Rig(
         points=TEMPLATE.decode(REST),
         faces=TEMPLATE.faces,
