@@ -24,7 +24,7 @@ READINGS = 4
 """Orientations that are tried at most,"""
 DOUBT = 5.0
 """with log odds no farther than this below the likeliest's."""
-STEEPNESS = 8
+STEEPNESS = 16
 """How fast a reading's worth falls with its distance."""
 PROBES = 600
 """Points by which normals are compared."""
