@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 PLACES = 1500
 """Vertices that are looked at."""
-ITERATIONS = 12
+ITERATIONS = 30
 SIGMA, ROBUST = 0.002, 0.05
 """How far vertices are off, and from where on they count for little, in metres of the body."""
 SIGMA_SHAPE, SIGMA_SCALE = 3.0, 1.0
