@@ -42,7 +42,6 @@ def test_the_card_says_that_it_is_a_body(body_folder: Path, model: BodyModel) ->
     assert (model.name, model.label) == ("human", "Human body")
     # More than the encoder sees are looked at by the refinement.
     assert model.points == model.template.points > POINTS
-    assert model.template.names == NAMES
     assert model.stands
     assert not model.other_body
 
