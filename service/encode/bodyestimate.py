@@ -8,12 +8,11 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from service.encode.bodyfit import ROUGH, STANDARD, Anchor, BodySettings, fit_body, posed_by
 from service.encode.bodyoutputs import BodyEncoding
 from service.encode.bodysamples import COUNT, LOG_SCALE, SHAPE, BodySamples
-from service.encode.distance import Cloud, mesh_distance
+from service.encode.distance import PROBES, Cloud, inside_out, mesh_distance
 from service.mesh.frame import Orientation, orientations
 from service.mesh.surface import Normalization, Samples
 from service.template.skinned import SHAPES, Body, SkinnedTemplate
@@ -26,10 +25,6 @@ DOUBT = 5.0
 """with log odds no farther than this below the likeliest's."""
 STEEPNESS = 16
 """How fast a reading's worth falls with its distance."""
-PROBES = 600
-"""Points by which normals are compared."""
-OPPOSED = -0.3
-"""A cloud whose normals agree with the body's no better than this, on the mean, is inside out."""
 PLAUSIBLE = (0.72, 1.4)
 """The file's unit is believed where a metre is so many times as long as the encoder thinks."""
 SIGMA_FLOOR = 0.01
@@ -86,14 +81,6 @@ class BodyEstimate:
         return np.asarray(self.body.rotations[0])
 
 
-@dataclass(frozen=True)
-class _Reading:
-    """The encoder's answer for one way of turning the cloud."""
-
-    anchor: Anchor
-    worth: float
-
-
 def estimate_body(
     model: BodyEncoder,
     samples: Samples,
@@ -115,9 +102,8 @@ def estimate_body(
     """
     normalization = Normalization.of(samples.points)
     cloud = Cloud(normalization.apply(samples.points), samples.normals)
-    reading, inside_out = _best_reading(model, samples, cloud)
-    anchor = reading.anchor
-    if inside_out:
+    anchor, turned = _best_anchor(model, samples, cloud)
+    if turned:
         cloud = Cloud(cloud.points, -cloud.normals)
     if metre is not None:
         known = normalization.scale * metre
@@ -128,19 +114,20 @@ def estimate_body(
     distance = mesh_distance(template.decode(start), template.faces, cloud)
     sigma = np.full(3 * COUNT + SHAPES, SIGMA_ENCODER)
     if not refined:
-        return BodyEstimate(start, sigma, distance, distance, normalization, inside_out)
+        return BodyEstimate(start, sigma, distance, distance, normalization, turned)
     fit = fit_body(template, replace(anchor, body=start), cloud, ROUGH if rough else settings)
     final = mesh_distance(template.decode(fit.body), template.faces, cloud)
     spread = np.sqrt(np.diag(fit.covariance))[:LOG_SCALE]
     spread[SHAPE] = np.maximum(spread[SHAPE], SIGMA_FLOOR)
     return BodyEstimate(
-        fit.body, np.hypot(spread, SIGMA_FLOOR), final, distance, normalization, inside_out
+        fit.body, np.hypot(spread, SIGMA_FLOOR), final, distance, normalization, turned
     )
 
 
-def _best_reading(model: BodyEncoder, samples: Samples, cloud: Cloud) -> tuple[_Reading, bool]:
-    """The orientation whose rough fit is best, and whether the faces are inside out."""
-    ways = orientations()
+def _best_anchor(model: BodyEncoder, samples: Samples, cloud: Cloud) -> tuple[Anchor, bool]:
+    """The encoder's answer for the orientation whose rough fit is best, and whether the faces are
+    inside out."""
+    template, ways = model.template, orientations()
     odds = model.discriminator.odds(samples.points, ways)
     order = np.argsort(-odds, kind="stable")[:READINGS]
     tried = [index for index in order if odds[index] > odds[order[0]] - DOUBT]
@@ -148,25 +135,20 @@ def _best_reading(model: BodyEncoder, samples: Samples, cloud: Cloud) -> tuple[_
     for index in tried:
         way = ways[index]
         encoding = model.encode(way.to_canonical(cloud.points)).turned(way.rotation.T)
-        body = encoding.body(model.template)
-        anchors.append(Anchor(encoding.joints, body))
-    starts = [posed_by(model.template, anchor) for anchor in anchors]
-    inside_out = opposes(model.template, starts[0], cloud)
+        anchors.append(Anchor(encoding.joints, encoding.body(template)))
+    starts = [posed_by(template, anchor) for anchor in anchors]
+    turned = opposes(template, starts[0], cloud)
     if len(anchors) == 1:
-        return _Reading(anchors[0], 1.0), inside_out
-    facing = Cloud(cloud.points, -cloud.normals) if inside_out else cloud
-    readings = []
+        return anchors[0], turned
+    facing = Cloud(cloud.points, -cloud.normals) if turned else cloud
+    worths = []
     for index, anchor, start in zip(tried, anchors, starts, strict=True):
-        fit = fit_body(model.template, replace(anchor, body=start), facing, ROUGH)
-        distance = mesh_distance(model.template.decode(fit.body), model.template.faces, facing)
-        readings.append(_Reading(anchor, float(odds[index]) - STEEPNESS * np.log(distance)))
-    return max(readings, key=lambda reading: reading.worth), inside_out
+        fit = fit_body(template, replace(anchor, body=start), facing, ROUGH)
+        distance = mesh_distance(template.decode(fit.body), template.faces, facing)
+        worths.append(float(odds[index]) - STEEPNESS * np.log(distance))
+    return anchors[int(np.argmax(worths))], turned
 
 
 def opposes(template: SkinnedTemplate, body: Body, cloud: Cloud) -> bool:
     """Whether a cloud's normals point into the body."""
-    points, normals = BodySamples.drawn(template, PROBES).at(body)
-    step = max(1, len(cloud.points) // PROBES)
-    nearest = cKDTree(points).query(cloud.points[::step])[1]
-    cosine = np.einsum("nc,nc->n", normals[nearest], cloud.normals[::step])
-    return float(cosine.mean()) < OPPOSED
+    return inside_out(*BodySamples.drawn(template, PROBES).at(body), cloud)

@@ -61,7 +61,6 @@ class BodySettings:
         sigma: how far a surface lies off the fitted one, clothes and all.
         counted: how many of the samples tell something of their own.
         sigma_vote: of the encoder's joints.
-        sigma_turn: of the encoder's rotations, in radians.
         sigma_shape: of the shape, in standard deviations of the population.
         sigma_limit: how far joints bend beyond their limits, in radians.
         sigma_scale: of the logarithm of the scale, where it is known.
@@ -76,7 +75,6 @@ class BodySettings:
     sigma: float = 0.01
     counted: float = 500.0
     sigma_vote: float = 0.06
-    sigma_turn: float = 0.35
     sigma_shape: float = 1.2
     sigma_limit: float = 0.1
     sigma_scale: float = 0.02

@@ -13,6 +13,12 @@ from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
 
+PROBES = 600
+"""Points by which normals are compared."""
+OPPOSED = -0.3
+"""A cloud whose normals agree with the template's no better than this, on the mean, is inside
+out."""
+
 
 @dataclass(frozen=True)
 class Cloud:
@@ -61,3 +67,16 @@ def _one_way(points: Array, surface: Array, normals: Array) -> float:
     across = np.abs(np.einsum("nc,nc->n", points - surface[nearest], normals[nearest]))
     along = np.sqrt(np.maximum(distance**2 - across**2, 0.0))
     return float(np.hypot(across, np.maximum(along - spacing, 0.0)).mean())
+
+
+def inside_out(points: Array, normals: Array, cloud: Cloud) -> bool:
+    """Whether a cloud's normals point into a fitted surface.
+
+    Args:
+        points, normals: ``[PROBES, 3]`` samples of the fit.
+        cloud: the upload.
+    """
+    step = max(1, len(cloud.points) // PROBES)
+    nearest = cKDTree(points).query(cloud.points[::step])[1]
+    cosine = np.einsum("nc,nc->n", normals[nearest], cloud.normals[::step])
+    return float(cosine.mean()) < OPPOSED

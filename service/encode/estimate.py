@@ -7,11 +7,10 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from service.encode.affineoutputs import Encoding
 from service.encode.basemodel import STEEPNESS
-from service.encode.distance import Cloud, surface_distance
+from service.encode.distance import PROBES, Cloud, inside_out, surface_distance
 from service.encode.refine import STANDARD, Settings, refine
 from service.mesh.surface import Normalization, Samples, sample_surface
 from service.template.affine import AffineTemplate
@@ -20,11 +19,6 @@ Array = NDArray[np.float64]
 
 DIVERGED = 1.5
 """A refinement that ends this much farther from the mesh than it began has lost its way."""
-PROBES = 600
-"""Points by which normals are compared."""
-OPPOSED = -0.3
-"""A cloud whose normals agree with the template's no better than this, on the mean, is inside
-out."""
 SIGMA_FLOOR = 0.002
 """Least standard deviation claimed for a refined parameter: the repeat error of measuring real
 shapes by hand is of this size (in the normalised frame's unit)."""
@@ -102,17 +96,17 @@ def estimate(
     likeliest = model.template.variants[order[0]]
     # Samples come in the order of the faces, so that every so-many-th is a fair draw.
     cloud = Cloud(points[::stride], samples.normals[::stride])
-    inside_out = opposes(likeliest, encoding, cloud)
-    if inside_out:
+    turned = opposes(likeliest, encoding, cloud)
+    if turned:
         cloud = Cloud(cloud.points, -cloud.normals)
     if not refined:
-        return _encoded(likeliest, encoding, cloud, normalization, inside_out)
+        return _encoded(likeliest, encoding, cloud, normalization, turned)
     fits = []
     for index in order[:CHOICES]:
         if encoding.shares[index] < DOUBT * encoding.shares[order[0]]:
             continue
         variant = model.template.variants[index]
-        start = _encoded(variant, encoding, cloud, normalization, inside_out)
+        start = _encoded(variant, encoding, cloud, normalization, turned)
         fit = _refined(start, cloud, settings, model.sigma_scale)
         # As in recognition: how likely it seemed, and how well it fits.
         fits.append((encoding.shares[index] * fit.distance**-STEEPNESS, fit))
@@ -124,14 +118,14 @@ def _encoded(
     encoding: Encoding,
     cloud: Cloud,
     normalization: Normalization,
-    inside_out: bool,
+    turned: bool,
 ) -> Estimate:
     """The encoder's answer, for one variant."""
     parameters, translation = encoding.parameters, encoding.translation
     distance = surface_distance(variant, parameters, translation, cloud)
     sigma = np.full(len(parameters), SIGMA_ENCODER)
     return Estimate(
-        variant, parameters, translation, sigma, distance, distance, normalization, inside_out
+        variant, parameters, translation, sigma, distance, distance, normalization, turned
     )
 
 
@@ -155,7 +149,4 @@ def opposes(template: AffineTemplate, encoding: Encoding, cloud: Cloud) -> bool:
     visible = template.faces[~template.hidden]
     vertices = template.decode(encoding.parameters) + encoding.translation
     samples = sample_surface(vertices, visible, PROBES, np.random.default_rng(3))
-    step = max(1, len(cloud.points) // PROBES)
-    nearest = cKDTree(samples.points).query(cloud.points[::step])[1]
-    cosine = np.einsum("nc,nc->n", samples.normals[nearest], cloud.normals[::step])
-    return float(cosine.mean()) < OPPOSED
+    return inside_out(samples.points, samples.normals, cloud)

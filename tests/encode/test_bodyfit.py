@@ -12,15 +12,9 @@ from service.encode.distance import Cloud
 from service.errors import Overloaded, TooComplex
 from service.mesh.surface import sample_surface
 from service.template.anatomy import JOINTS, limits
-from service.template.bodyfile import load_body
 from service.template.skinned import Body, SkinnedTemplate, body_of
 
 COUNT = len(JOINTS)
-
-
-@pytest.fixture(scope="module")
-def human() -> SkinnedTemplate:
-    return load_body()
 
 
 def random_body(seed: int) -> Body:

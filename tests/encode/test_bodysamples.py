@@ -5,13 +5,7 @@ import pytest
 
 from service.encode.bodysamples import LOG_SCALE, PLACE, SHAPE, STEP, BodySamples, stepped
 from service.template.anatomy import JOINTS, descendants
-from service.template.bodyfile import load_body
 from service.template.skinned import Body, SkinnedTemplate, body_of
-
-
-@pytest.fixture(scope="module")
-def human() -> SkinnedTemplate:
-    return load_body()
 
 
 @pytest.fixture(scope="module")

@@ -10,15 +10,9 @@ from service import deadline
 from service.encode.correspondence import fit_vertices
 from service.errors import Overloaded, TooComplex
 from service.template.anatomy import JOINTS, limits
-from service.template.bodyfile import load_body
 from service.template.skinned import Body, SkinnedTemplate, body_of
 
 COUNT = len(JOINTS)
-
-
-@pytest.fixture(scope="module")
-def human() -> SkinnedTemplate:
-    return load_body()
 
 
 def random_body(seed: int) -> Body:

@@ -29,7 +29,6 @@ from model_export.body.rig import CUBES, joint_positions, skinning_weights
 from model_export.body.thin import thinned
 from model_export.body.tpose import t_pose
 from service.template.anatomy import JOINTS, MIRRORED
-from service.template.bodyfile import load_body
 from service.template.skinned import SkinnedTemplate, body_of
 
 Array = NDArray[np.float64]
@@ -41,11 +40,6 @@ FLIP = np.array([-1.0, 1.0, 1.0])
 CELLS = 8
 BAGS = {(1, 1): 1, (1, 2): 1, (6, 1): 2, (6, 2): 2}
 """Front cells of the stand-in's eye sockets, by column and row; its mouth is in rows 5 and 6."""
-
-
-@pytest.fixture(scope="module")
-def human() -> SkinnedTemplate:
-    return load_body()
 
 
 @pytest.fixture(scope="module")

@@ -3,18 +3,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 import torch
 from scipy.spatial import cKDTree
 
 from model_export.bodies import TILT, BodyBatch, Garments, SyntheticBodies
-from service.template.bodyfile import load_body
 from service.template.skinned import Body, SkinnedTemplate
-
-
-@pytest.fixture(scope="module")
-def human() -> SkinnedTemplate:
-    return load_body()
 
 
 def drawn(human: SkinnedTemplate, garments: Garments, count: int = 6) -> BodyBatch:

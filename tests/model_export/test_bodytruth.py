@@ -34,11 +34,6 @@ from service.template.skinned import SkinnedTemplate, body_of
 COUNT = len(JOINTS)
 
 
-@pytest.fixture(scope="module")
-def human() -> SkinnedTemplate:
-    return load_body()
-
-
 class Rigid:
     """A model that takes every body for the one at rest, upright and where the cloud is."""
 

@@ -17,18 +17,12 @@ from model_export.train_body import (
     run,
 )
 from service.encode.bodyoutputs import ANCHORS
-from service.template.bodyfile import load_body
 from service.template.skinned import SkinnedTemplate
 
 SMALL = BodyConfig(
     steps=8, batch=4, real_share=0.25, points=160, warmup=2, width=16, depth=1, neighbours=6,
     precision="fp32",
 )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def human() -> SkinnedTemplate:
-    return load_body()
 
 
 @pytest.fixture

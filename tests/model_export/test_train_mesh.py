@@ -13,13 +13,7 @@ from model_export.meshnet import MeshNet
 from model_export.train_mesh import MeshBodies, loss_of, median_error, train, turns_of, write_onnx
 from service.encode.meshencoder import MeshEncoder
 from service.errors import ModelFault
-from service.template.bodyfile import load_body
 from service.template.skinned import SkinnedTemplate, body_of
-
-
-@pytest.fixture(scope="module")
-def human() -> SkinnedTemplate:
-    return load_body()
 
 
 @pytest.fixture(scope="module")

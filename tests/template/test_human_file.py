@@ -10,7 +10,6 @@ import trimesh
 from numpy.typing import NDArray
 
 from service.template.anatomy import JOINTS, MIRRORED, PARENTS, descendants
-from service.template.bodyfile import load_body
 from service.template.skinned import SkinnedTemplate, body_of
 
 Array = NDArray[np.float64]
@@ -21,11 +20,6 @@ FLIP = np.array([-1.0, 1.0, 1.0])
 def fields() -> dict[str, NDArray[np.generic]]:
     with (resources.files("service.template") / "human.npz").open("rb") as file:
         return dict(np.load(file, allow_pickle=False))
-
-
-@pytest.fixture(scope="module")
-def human() -> SkinnedTemplate:
-    return load_body()
 
 
 def shaped(human: SkinnedTemplate, label: str, coefficient: float) -> Array:
