@@ -49,7 +49,7 @@ class GlbFile(GltfFile):
         first, *others = self._chunks
         data = memoryview(self.data)
         pieces: list[Buffer] = [data[HEADER.size : first.end]]
-        if text != self._document.text:
+        if text != self.document.text:
             encoded = text.encode()
             pieces = packed(JSON, encoded, b" " * (-len(encoded) % 4))
         done = first.end

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from service.mesh import moves
-from service.mesh.buffers import Buffers, Files, data_uri
+from service.mesh.buffers import Buffers, Draft, Files, data_uri
 from service.mesh.document import Document
 from service.mesh.geometry import read_geometry
 from service.mesh.gltfpatch import Patch
@@ -26,15 +26,19 @@ class GltfFile(MeshFile):
         """
         self.data = data
         self._files = files
-        self._document, self._buffers = self._open()
-        self._geometry = read_geometry(self._document, self._buffers)
-        self.vertices = self._geometry.vertices
-        self.faces = self._geometry.faces
+        self.document, self.buffers = self._open()
+        self.geometry = read_geometry(self.document, self.buffers)
+        self.vertices = self.geometry.vertices
+        self.faces = self.geometry.faces
 
     @property
     def visible(self) -> Faces:
         """See `MeshFile.visible`; all faces where no node is there to be seen."""
-        return self._geometry.visible
+        return self.geometry.visible
+
+    def beside(self, uri: str) -> bytes | None:
+        """A file that came with the asset; None without any, ShapeError where it isn't there."""
+        return None if self._files is None else self._files.read(self._files.locate(uri))
 
     def _open(self) -> tuple[Document, Buffers]:
         document = Document(self.format, self.data)
@@ -50,24 +54,27 @@ class GltfFile(MeshFile):
         change = moves.compare(self.vertices, vertices, linear)
         if not change.any:
             return {"": self.data}
-        patch = Patch(self._document, self._buffers, self._geometry)
+        patch = Patch(self.document, self.buffers, self.geometry)
         patch.apply(change)
-        edits: dict[Path, Any] = patch.edits
+        return self.assemble(patch.edits, patch.draft)
+
+    def assemble(self, edits: dict[Path, Any], draft: Draft) -> dict[str, bytes]:
+        """The files with other JSON values and other buffers; see `MeshFile.write_files`."""
         chunk = None
         files: dict[str, bytes] = {}
-        for index, content in patch.draft.changed().items():
-            entry = self._document.entry("buffers", index)
+        for index, content in draft.changed().items():
+            entry = self.document.entry("buffers", index)
             if len(content) != entry["byteLength"]:
                 edits["buffers", index, "byteLength"] = len(content)
-            if self._buffers.in_chunk(index):
+            if self.buffers.in_chunk(index):
                 chunk = content
-            elif name := self._buffers.file(index):
-                files[name] = self._buffers.rewritten(index, content)
+            elif name := self.buffers.file(index):
+                files[name] = self.buffers.rewritten(index, content)
             else:
                 edits["buffers", index, "uri"] = data_uri(entry["uri"], content)
         if not edits and chunk is None:
             return {"": self.data, **files}
-        text = self._document.text
+        text = self.document.text
         return {"": self._pack(splice(text, edits) if edits else text, chunk), **files}
 
     def _pack(self, text: str, chunk: bytes | bytearray | None) -> bytes:

@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 
 from service import deadline
 from service.mesh.accessors import FLOAT, Accessor, Stored, Values, sharing_bytes
+from service.mesh.additions import VERTEX_DATA, Additions
 from service.mesh.bounds import bounds, same_bound
 from service.mesh.buffers import Buffers, Draft
 from service.mesh.document import Document, Object
 from service.mesh.geometry import NORMAL, POSITION, Geometry, Use
-from service.mesh.jsontext import END, Path
+from service.mesh.jsontext import Path
 from service.mesh.meshcopies import Repointing, pinned_accessors
 from service.mesh.moves import Moves
 from service.mesh.occupied import Occupied, element_size
 from service.mesh.polygons import Indices
 
-VERTEX_DATA = 34962
 # Instances agree when their local values differ by less than this part of their size.
 AGREEMENT = 1e-6
 
@@ -79,7 +79,7 @@ class Patch:
         self._document = document
         self._buffers = buffers
         self._geometry = geometry
-        self._added: dict[str, list[Object]] = defaultdict(list)
+        self._additions = Additions(document, self.draft)
         # What each accessor holds from now on, of those that share bytes with another.
         self._expected: dict[int, Stored] = {}
         self._shared = sharing_bytes(geometry.accessors.values())
@@ -102,11 +102,10 @@ class Patch:
             self._keep(accessor, old, contents[0])
             for content in contents[1:]:
                 entry = self._own_storage(accessor, content.full(old))
-                repointing.assign(content.uses, self._add("accessors", entry))
+                repointing.assign(content.uses, self._additions.add("accessors", entry))
         self._settle_overlaps()
-        self.edits |= repointing.edits(lambda mesh: self._add("meshes", mesh))
-        for kind, entries in self._added.items():
-            self.edits[kind, END] = entries
+        self.edits |= repointing.edits(lambda mesh: self._additions.add("meshes", mesh))
+        self.edits |= self._additions.edits()
 
     def _contents(self, old: Values, uses: list[Use], change: Moves) -> list[Content]:
         """The different contents that an accessor's uses ask for, the unchanged one first."""
@@ -208,27 +207,12 @@ class Patch:
             stored = values.astype("<f4")
             entry["componentType"] = FLOAT
             entry.pop("normalized", None)
-        size = stored.shape[1] * stored.itemsize
-        padded = np.zeros((len(stored), size + -size % 4), np.uint8)
-        padded[:, :size] = np.ascontiguousarray(stored).view(np.uint8)
         buffer = accessor.spans[0].buffer if accessor.spans else 0
-        view: Object = {
-            "buffer": buffer,
-            "byteOffset": self.draft.append(buffer, padded.tobytes()),
-            "byteLength": padded.size,
-        }
-        if size % 4:
-            view["byteStride"] = padded.shape[1]
-        entry["bufferView"] = self._add("bufferViews", view | {"target": VERTEX_DATA})
+        entry["bufferView"] = self._additions.elements_view(stored, buffer, VERTEX_DATA)
         for name, bound in zip(("min", "max"), bounds(stored), strict=True):
             if name in entry and np.isfinite(bound).all():
                 entry[name] = bound.tolist()
         return entry
-
-    def _add(self, kind: str, entry: Object) -> int:
-        """Add an object to a top-level array; returns its number there."""
-        self._added[kind].append(entry)
-        return len(self._document.array(self._document.root, kind)) + len(self._added[kind]) - 1
 
     def _settle_overlaps(self) -> None:
         """Part accessors that overwrote each other's bytes."""

@@ -17,7 +17,11 @@ NAMED = 5
 
 
 class ZippedFile(MeshFile):
-    """An archive that answers as the mesh in it does; `format` is that mesh's."""
+    """An archive that answers as the mesh in it does; `format` is that mesh's.
+
+    Attributes:
+        inner: that mesh.
+    """
 
     media_type = "application/zip"
 
@@ -33,12 +37,12 @@ class ZippedFile(MeshFile):
         self._member = mesh_member(list(self._archive.members), readers)
         reader, content = readers[_suffix(self._member)], self._archive.read(self._member)
         if issubclass(reader, GltfFile):
-            self._mesh: MeshFile = reader(content, Folder(self._archive, self._member))
+            self.inner: MeshFile = reader(content, Folder(self._archive, self._member))
         else:
-            self._mesh = reader(content)
-        self.format = self._mesh.format
-        self.vertices = self._mesh.vertices
-        self.faces = self._mesh.faces
+            self.inner = reader(content)
+        self.format = self.inner.format
+        self.vertices = self.inner.vertices
+        self.faces = self.inner.faces
 
     @property
     def suffix(self) -> str:
@@ -48,11 +52,11 @@ class ZippedFile(MeshFile):
     @property
     def visible(self) -> Faces:
         """See `MeshFile.visible`."""
-        return self._mesh.visible
+        return self.inner.visible
 
     def write(self, vertices: Vertices, linear: Linear) -> bytes:
         """See `MeshFile.write`; only members that hold what moved differ."""
-        written = self._mesh.write_files(vertices, linear)
+        written = self.inner.write_files(vertices, linear)
         return self._archive.replaced({name or self._member: c for name, c in written.items()})
 
 

@@ -1,0 +1,92 @@
+"""Any mesh as one GLB: what came beside a glTF is put into it, bare geometry is wrapped."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import copy
+import mimetypes
+from typing import Any
+
+from service.errors import ShapeError
+from service.mesh.convert import convert
+from service.mesh.document import Object
+from service.mesh.glb import BIN, HEADER, JSON, GlbFile, packed
+from service.mesh.gltf import GltfFile
+from service.mesh.jsontext import dump
+from service.mesh.meshcopies import objects
+from service.mesh.meshfile import MeshFile
+from service.mesh.zipped import ZippedFile
+
+ALIGNMENT = 4
+
+
+def as_glb(mesh: MeshFile, metres: float) -> GlbFile:
+    """The mesh as a GLB that needs no other file, vertices in the same order.
+
+    Args:
+        mesh: of any format.
+        metres: per unit of the file, which a GLB is measured in; of glTF, 1.
+    """
+    inner = mesh.inner if isinstance(mesh, ZippedFile) else mesh
+    if isinstance(inner, GlbFile) and _is_whole(inner):
+        return inner
+    if isinstance(inner, GltfFile):
+        return GlbFile(_embedded(inner))
+    return GlbFile(convert(inner.vertices * metres, inner.faces, "glb"))
+
+
+def _is_whole(file: GlbFile) -> bool:
+    """Whether the first buffer is the binary chunk, and nothing is in another file."""
+    root = file.document.root
+    linked = [*objects(file.document, root, "buffers"), *objects(file.document, root, "images")]
+    uris = [str(entry["uri"]) for entry in linked if "uri" in entry]
+    return file.buffers.in_chunk(0) and all(uri.startswith("data:") for uri in uris)
+
+
+def _embedded(file: GltfFile) -> bytes:
+    """A GLB of an asset whose buffers and images are all in its binary chunk."""
+    root: Object = copy.deepcopy(file.document.root)
+    chunk = bytearray()
+
+    def append(content: bytes | memoryview) -> int:
+        chunk.extend(bytes(-len(chunk) % ALIGNMENT))
+        chunk.extend(content)
+        return len(chunk) - len(content)
+
+    starts = [append(file.buffers[index]) for index in range(len(root.get("buffers", [])))]
+    views: list[Any] = root.setdefault("bufferViews", [])
+    for view in objects(file.document, root, "bufferViews"):
+        view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
+        view["buffer"] = 0
+    for image in objects(file.document, root, "images"):
+        if (found := _image(file, image)) is not None:
+            content, image["mimeType"] = found
+            del image["uri"]
+            image["bufferView"] = len(views)
+            start = append(content)
+            views.append({"buffer": 0, "byteOffset": start, "byteLength": len(content)})
+    root["buffers"] = [{"byteLength": len(chunk)}]
+    text = dump(root).encode()
+    pieces = packed(JSON, text, b" " * (-len(text) % ALIGNMENT))
+    pieces += packed(BIN, chunk, bytes(-len(chunk) % ALIGNMENT))
+    return HEADER.pack(b"glTF", 2, HEADER.size + sum(map(len, pieces))) + b"".join(pieces)
+
+
+def _image(file: GltfFile, image: Object) -> tuple[bytes, str] | None:
+    """An image's bytes and media type; None where it stays as it is: embedded, or out of reach."""
+    uri = image.get("uri")
+    if not isinstance(uri, str):
+        return None
+    if uri.startswith("data:"):
+        head, _, payload = uri.partition(",")
+        try:
+            return base64.b64decode(payload, validate=True), head[5:].partition(";")[0]
+        except (binascii.Error, ValueError):
+            return None
+    kind = image.get("mimeType") or mimetypes.guess_type(uri)[0]
+    try:
+        content = file.beside(uri)
+    except ShapeError:
+        return None
+    return None if content is None or not kind else (content, str(kind))
