@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from service.deform.gradient import Gradient
+from service.deform.weld import Welded
 from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
@@ -27,18 +29,25 @@ class Binding:
             stretch: three a box, along its axes, and more where a part tapers.
         stretches: ``[k, 9, d]`` float32, the linear map (row-major 3 x 3) that a unit of each
             parameter adds to each.
+        welded: the mesh without its seams, where that is known.
     """
 
     jacobian: Array32
     gains: Array32
     stretches: Array32
+    welded: Welded | None = None
 
     def displace(self, df: ArrayLike) -> Array32:
         """Displacements ``[V, 3]`` for a change of the parameters ``df [d]``.
 
         Coordinates that no changed parameter moves are exactly zero.
         """
-        return self.jacobian @ np.asarray(df, np.float32)
+        df = np.asarray(df, np.float32)
+        moved = np.zeros((3, len(self.jacobian)), np.float32)
+        for index in np.flatnonzero(df):
+            for axis in range(3):
+                moved[axis] += df[index] * self.jacobian[:, axis, index]
+        return moved.T
 
     def linear(self, df: ArrayLike) -> Array32:
         """Local linear maps ``[V, 3, 3]`` for ``df [d]``: tangents follow them, normals their
@@ -46,6 +55,18 @@ class Binding:
         added = self.gains @ (self.stretches @ np.asarray(df, np.float32))
         maps: Array32 = added.reshape(-1, 3, 3) + np.eye(3, dtype=np.float32)
         return maps
+
+    def gradient(self, index: int, rows: NDArray[np.int64] | slice) -> Gradient:
+        """What a unit of one parameter adds to the linear maps of some vertices."""
+        added = self.stretches[:, :, index]
+        ways, cells = (np.flatnonzero(added.any(axis=axis)) for axis in (1, 0))
+        gains = [self.gains[rows, way] for way in ways]
+        values = np.zeros((len(cells), len(self.gains[rows, 0])), np.float32)
+        for value, cell in zip(values, cells, strict=True):
+            for gain, change in zip(gains, added[ways, cell], strict=True):
+                if change:
+                    value += change * gain
+        return Gradient([divmod(cell, 3) for cell in cells.tolist()], values)
 
 
 def inverse_frames(frames: Array) -> Array:

@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 
 from service.deform.binding import Binding, inverse_frames
 from service.deform.clamp import saturate, stretch_limits
-from service.deform.compilation import compile_binding
-from service.deform.discord import discord, group_fields
+from service.deform.compilation import Compiler, Field, Moves
+from service.deform.discord import discord
 from service.deform.groups import Group, hub_parts, mirror_groups
 from service.deform.loft import lofts
 from service.deform.pieces import Votes, touching_pieces, vote
-from service.deform.proximity import BAND, Boxes, group_distance, nearness
+from service.deform.proximity import BAND, Boxes, blocks, group_distance, nearness
 from service.deform.roots import rooted
-from service.deform.seams import flush_seams
+from service.deform.seams import Seams, flush_seams
 from service.deform.shares import Blocks, all_shares
 from service.deform.spine import straighten
 from service.deform.spinefit import Spine
-from service.deform.weld import Welded, weld
+from service.deform.weld import weld
 from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
@@ -59,22 +59,20 @@ def bind(
     hubs = hub_parts(fit.template)
     spines = straighten(u, welded.faces, fit.boxes, fit.groups, hubs)
     distances = fit.boxes.distances(u)
-    to_group = np.stack(
-        [group_distance(x, distances, fit.boxes, group) for group in fit.groups], axis=1
-    )
+    to_group = np.stack([group_distance(x, distances, fit.boxes, group) for group in fit.groups]).T
     low, high = welded.boxes()
     votes = vote(
         u, distances, to_group, welded.piece, touching_pieces(low, high), fit.groups,
         fit.boxes, hubs,
     )  # fmt: skip
-    blocks = Blocks(welded.piece, high - low, votes.whole)
-    shares = all_shares(u, fit.boxes, fit.groups, blocks)
-    local, gains, near = _follow(fit, welded, u, to_group, spines, votes, shares)
-    weights = shares.copy()
-    for g, group in enumerate(fit.groups):
-        weights[:, list(group.members)] *= near[:, g, None]
-    bound = compile_binding(fit.template, fit.boxes, weights, local, gains)
-    return Binding(bound.jacobian[welded.of], bound.gains[welded.of], bound.stretches)
+    shares = all_shares(u, fit.boxes, fit.groups, Blocks(welded.piece, high - low, votes.whole))
+    following = _Following.of(fit, spines, votes)
+    compiler = Compiler(fit.template, fit.boxes, fit.groups, len(x))
+    for rows in blocks(len(x)):
+        compiler.add(
+            rows, *following.of_some(u[rows], welded.piece[rows], to_group[rows], shares[rows])
+        )
+    return compiler.binding(welded)
 
 
 @dataclass(frozen=True)
@@ -93,28 +91,58 @@ def _fit(template: AffineTemplate, f: Array) -> _Fit:
     return _Fit(cut, f, boxes, mirror_groups(cut))
 
 
-def _follow(
-    fit: _Fit,
-    welded: Welded,
-    u: Array32,
-    to_group: Array32,
-    spines: dict[int, Spine],
-    votes: Votes,
-    shares: Array32,
-) -> tuple[Array32, Array32, Array32]:
-    """Where each part carries each vertex, the gains, and the groups' shares ``[n, G]``."""
-    local, gains = saturate(u, *stretch_limits(fit.boxes, fit.groups, spines))
-    keep, anchor = votes.keep[welded.piece], votes.anchor[welded.piece]
-    local = anchor + keep * (local - anchor)
-    gains = keep * gains
-    near = votes.shares[welded.piece]
-    free = np.flatnonzero(~votes.whole[welded.piece])
-    if len(free):
+@dataclass(frozen=True)
+class _Following:
+    """How vertices follow the parts, once it is known what the pieces do.
+
+    Attributes:
+        groups: of the parts.
+        votes: of the pieces.
+        moves: of the parts with the parameters.
+        limits, reach: of the parts' stretch; see `saturate`.
+        seams: where parts meet flush.
+        offered: ``[d]`` fitted parameters, 0 for those that users don't change.
+    """
+
+    groups: list[Group]
+    votes: Votes
+    moves: Moves
+    limits: Array32
+    reach: Array32
+    seams: Seams
+    offered: Array
+
+    @classmethod
+    def of(cls, fit: _Fit, spines: dict[int, Spine], votes: Votes) -> _Following:
+        limits, reach = stretch_limits(fit.boxes, fit.groups, spines)
         seams = flush_seams(fit.template, fit.boxes, spines)
-        local[free], slope = seams.carry(local[free])
-        gains[free] *= slope
-        fields = group_fields(fit.template, shares[free], local[free], fit.groups)
         offered = np.where(fit.template.public, fit.f, 0.0)
-        band = BAND + DISCORD * discord(fields, to_group[free], offered)
-        near[free] = nearness(to_group[free], band)
-    return local, gains, near
+        return cls(fit.groups, votes, Moves.of(fit.template), limits, reach, seams, offered)
+
+    def of_some(
+        self, u: Array32, piece: NDArray[np.int64], to_group: Array32, shares: Array32
+    ) -> tuple[list[Field], Array32, Array32, Array32, Array32]:
+        """What `Compiler.add` takes of some vertices.
+
+        Args:
+            u: ``[n, P, 3]`` straightened unit coordinates.
+            piece: ``[n]``.
+            to_group: ``[n, G]`` distances to the groups.
+            shares: ``[n, P]`` of the parts in their groups.
+        """
+        local, gains = saturate(u, self.limits, self.reach)
+        votes, present = self.votes, np.flatnonzero(np.bincount(piece))
+        for part, axis in np.argwhere((votes.keep[present] < 1.0).any(axis=0)):
+            keep, anchor = (m[:, part, axis][piece] for m in (votes.keep, votes.anchor))
+            local[:, part, axis] = anchor + keep * (local[:, part, axis] - anchor)
+            gains[:, part, axis] *= keep
+        free = ~votes.whole[piece]
+        if free.any():
+            self.seams.carry(local, gains, free)
+        fields = self.moves.fields(self.groups, shares, local)
+        near = np.stack([share[piece] for share in votes.shares.T])
+        if free.any():
+            band = BAND + DISCORD * discord(fields, to_group, self.offered)
+            np.copyto(near, nearness(to_group, band).T, where=free)
+        near = near.T
+        return fields, shares, near, local, gains

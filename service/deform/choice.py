@@ -146,7 +146,7 @@ def realised(low: Array32, high: Array32, boxes: Boxes) -> Mask:
 
 
 def mean_distance(distance: Array32, starts: Index) -> Array32:
-    """``[pieces, m]`` root mean squares over each piece of ``distance [n, m]``."""
-    counts = np.diff([*starts, len(distance)])
-    mean: Array32 = np.sqrt(np.add.reduceat(distance**2, starts) / counts[:, None])
+    """``[pieces, m]`` root mean squares over each piece of ``distance [m, n]``."""
+    counts = np.diff([*starts, distance.shape[1]])
+    mean: Array32 = np.sqrt(np.add.reduceat(distance**2, starts, axis=1) / counts).T
     return mean

@@ -48,7 +48,14 @@ def saturate(u: Array32, limits: Array32, reach: Array32) -> tuple[Array32, Arra
     Returns:
         Clamped coordinates and their derivatives, both ``[V, P, 3]``.
     """
-    beyond = np.maximum(np.abs(u) - limits, 0.0)
-    room = np.where(u < 0.0, reach[0], reach[1])
-    gain = np.exp(-beyond / room)
-    return np.clip(u, -limits, limits) + np.sign(u) * (room * (1.0 - gain)), gain
+    count, parts, _ = u.shape
+    clamped, gains = np.empty((2, parts, 3, count), np.float32)
+    for part, axis in np.ndindex(parts, 3):
+        own, limit = u[:, part, axis], limits[part, axis]
+        low, high = reach[:, part, axis]
+        beyond = np.maximum(np.abs(own) - limit, 0.0)
+        room = low if low == high else np.where(own < 0.0, low, high)
+        gain = np.exp(-beyond / room, out=gains[part, axis])
+        inner = np.clip(own, -limit, limit)
+        np.add(inner, np.copysign(room * (1.0 - gain), own), out=clamped[part, axis])
+    return clamped.transpose(2, 0, 1), gains.transpose(2, 0, 1)

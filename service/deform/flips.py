@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from service.deform.normals import face_crosses
+from service.deform.normals import Real, cross, face_crosses
 
 NEGLIGIBLE = 1e-4
 """Faces smaller than this share of the mean area have no direction worth counting."""
-STRETCH = 3.0
-"""A symmetric map whose stretches are within this factor of each other turns no normal by more
-than 30 degrees: asin((3 - 1) / (3 + 1))."""
+CALM = 0.5
+"""A map that is a multiple of the identity but for this share of it turns no normal by more than
+30 degrees: asin(0.5)."""
 
 
 def flipped(
@@ -27,35 +27,46 @@ def flipped(
         faces: ``[F, 3]``.
         maps: ``[V, 3, 3]`` local linear maps of the edit.
     """
-    normal, turned = face_crosses(before, faces), face_crosses(after, faces)
-    squared = np.einsum("fi,fi->f", normal, normal)
-    counted = squared > (NEGLIGIBLE * np.sqrt(squared).mean()) ** 2
-    suspects = np.ones(len(faces), bool)
-    if _turns_little(maps):
-        # Nor has a face flipped whose own normal turned by less than the 60 degrees that remain.
-        cosine = np.einsum("fi,fi->f", normal, turned)
-        suspects = cosine < 0.5 * np.sqrt(squared * np.einsum("fi,fi->f", turned, turned))
-    rows = np.flatnonzero(suspects & counted)
-    corners = faces[rows]
-    mean = maps[corners].mean(axis=1)
-    origin = before[corners[:, 0]]
-    sides = (before[corners[:, 1]] - origin, before[corners[:, 2]] - origin)
-    carried = np.cross(*(np.einsum("fij,fj->fi", mean, side) for side in sides))
+    normal, turned = face_crosses(before, faces).T, face_crosses(after, faces).T
+    squared = dot(normal, normal)
+    # Where the maps turn little, no face has flipped whose own normal turned by less than the 60
+    # degrees that remain.
+    suspects = dot(normal, turned) < 0.5 * np.sqrt(squared * dot(turned, turned))
+    wild = _wild(maps)
+    if wild.any():
+        suspects |= wild[faces].any(axis=1)
+    rows = np.flatnonzero(suspects & counted(squared))
+    a, b, c = faces[rows].T
+    mean = ((maps[a] + maps[b] + maps[c]) / 3).transpose(1, 2, 0)
+    sides = ((before[end] - before[a]).T for end in (b, c))
+    carried = cross(*((mean * side).sum(axis=1) for side in sides))
     folded = np.zeros(len(faces), bool)
-    folded[rows] = np.einsum("fi,fi->f", carried, turned[rows]) < 0.0
+    folded[rows] = dot(carried, turned[:, rows]) < 0.0
     return folded
 
 
-def _turns_little(maps: NDArray[np.floating]) -> bool:
-    """Whether all maps are symmetric with stretches, by Gershgorin's bounds, within `STRETCH`."""
-    above, below = maps[:, [0, 0, 1], [1, 2, 2]], maps[:, [1, 2, 2], [0, 0, 1]]
-    if not np.array_equal(above, below):
-        return False
-    ab, ac, bc = np.abs(above).T
-    diagonal = maps[:, [0, 1, 2], [0, 1, 2]]
-    off = np.stack([ab + ac, ab + bc, ac + bc], axis=1)
-    low, high = (diagonal - off).min(axis=1), (diagonal + off).max(axis=1)
-    return bool((low > 0.0).all() and (high <= STRETCH * low).all())
+def counted(squared: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """``[F]`` faces that have a direction, by their normals' squared lengths ``[F]``."""
+    least = NEGLIGIBLE * np.sqrt(squared).mean() if len(squared) else 0.0
+    return np.asarray(squared > least**2)
+
+
+def dot(a: NDArray[Real], b: NDArray[Real]) -> NDArray[Real]:
+    """``[n]`` products of vectors ``[3, n]``."""
+    product: NDArray[Real] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return product
+
+
+def _wild(maps: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """``[V]`` vertices whose maps are not all near, to `CALM`, one multiple of the identity.
+
+    What is near it is a convex set, so that the mean of a face's three maps is in it with them.
+    """
+    x, y, z = maps[:, 0, 0], maps[:, 1, 1], maps[:, 2, 2]
+    low, high = np.minimum(np.minimum(x, y), z), np.maximum(np.maximum(x, y), z)
+    multiple = max(0.5 * float((low + high).mean()), 0.0) if len(maps) else 0.0
+    rest = (maps - multiple * np.eye(3, dtype=maps.dtype)).reshape(len(maps), 9)
+    return np.asarray(np.einsum("vi,vi->v", rest, rest) >= (CALM * multiple) ** 2)
 
 
 def count_flips(

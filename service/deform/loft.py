@@ -33,9 +33,9 @@ class Outline:
     half: Array
 
     def at(self, s: Array32) -> tuple[Array32, Array32]:
-        """Middle and half size, both ``[n, 2]``, at ``s [n]`` along the run."""
+        """Middle and half size, both ``[2, n]``, at ``s [n]`` along the run."""
         center, half = (
-            np.stack([np.interp(s, self.levels, c).astype(np.float32) for c in table.T], axis=1)
+            np.stack([np.interp(s, self.levels, c).astype(np.float32) for c in table.T])
             for table in (self.center, self.half)
         )
         return center, half
@@ -79,33 +79,42 @@ class Loft:
         return self.frame[self.across, self.run].astype(np.float32)
 
     def section(self, s: Array32) -> Array32:
-        """``[n, 2]`` signed sizes across the run at ``s [n]``, none nearer to nothing than
+        """``[2, n]`` signed sizes across the run at ``s [n]``, none nearer to nothing than
         `FLOOR`."""
         across = self.across
-        size = s[:, None] * self.taper[across].astype(np.float32)
-        size += self.frame[across, across].astype(np.float32)
+        size = np.multiply.outer(self.taper[across].astype(np.float32), s)
+        size += self.frame[across, across].astype(np.float32)[:, None]
         return np.copysign(np.maximum(np.abs(size), np.float32(FLOOR)), size)
 
     def unit(self, x: Array) -> Array32:
-        """Unit coordinates ``[n, 3]`` of points ``x [n, 3]``."""
-        maps = Frames(self.frame[None], np.diag(self.taper)[None], np.array([self.run]))
-        return maps.unit(x)[:, 0].astype(np.float32)
+        """Unit coordinates ``[n, 3]`` of points ``x [n, 3]``, as `Frames.unit` has them."""
+        u = np.empty((3, len(x)), np.float32)
+        along = (x[:, self.run] - self.frame[self.run, 3]) / self.length
+        s = np.clip(along, -0.5, 0.5)
+        u[self.run] = along
+        for axis in self.across:
+            size = self.frame[axis, axis] + s * self.taper[axis]
+            size = np.copysign(np.maximum(np.abs(size), FLOOR), size)
+            u[axis] = (x[:, axis] - self.frame[axis, 3] - along * self.frame[axis, self.run]) / size
+        return u.T
 
     def distance(self, u: Array32) -> Array32:
         """``[n]`` distance from the part, nearly, of points with unit coordinates ``u [n, 3]``."""
         along = u[:, self.run]
         s = np.clip(along, -0.5, 0.5)
+        beyond = along - s
         # Across a leaning part, less of an offset along the axes is away from it.
-        upright = (1.0 / np.hypot(1.0, self.lean / self.length)).astype(np.float32)
+        upright = (1.0 / np.hypot(1.0, self.lean / self.length)).astype(np.float32)[:, None]
         size = np.abs(self.section(s)) * upright
-        offset = u[:, self.across] * size + (along - s)[:, None] * self.lean * upright
+        offset = np.stack([u[:, axis] for axis in self.across]) * size
+        offset += np.multiply.outer(self.lean * upright[:, 0], beyond)
         if self.outline is None:
             aside = _beyond_box(offset, np.float32(0.5) * size)
         else:
             center, half = self.outline.at(s)
             half = np.maximum(half * size, np.float32(FLOOR / 2))
             aside = _beyond_ellipse(offset - center * size, half)
-        return np.hypot(aside, (along - s) * np.float32(self.length))
+        return _norm(aside, beyond * np.float32(self.length))
 
 
 def lofts(
@@ -121,17 +130,22 @@ def lofts(
     """
     # Thin parts are seen more clearly in the middle of the ranges, swollen ones as they are.
     middle = (template.low + template.high) / 2
-    plain, own = (template.maps(g).unit(template.decode(g)) for g in (middle, f))
+    shapes = [(template.maps(g), template.decode(g)) for g in (middle, f)]
     found = {}
-    for part, run in enumerate(template.run):
+    for part, run in enumerate(template.run.tolist()):
         of_part = template.part == part
-        outline = None
-        if not _is_box(plain[of_part, part], int(run)):
-            outline = _outline(own[of_part, part], int(run), starts[part])
+        plain, own = (_unit(maps, part, vertices[of_part]) for maps, vertices in shapes)
+        outline = None if _is_box(plain, run) else _outline(own, run, starts[part])
         taper = np.diagonal(tapers[part])
         if outline is not None or taper.any():
-            found[part] = Loft(frames[part], taper, int(run), outline)
+            found[part] = Loft(frames[part], taper, run, outline)
     return found
+
+
+def _unit(maps: Frames, part: int, x: Array) -> Array:
+    """Unit coordinates ``[n, 3]`` of points ``x [n, 3]`` in one part."""
+    one = slice(part, part + 1)
+    return Frames(maps.frames[one], maps.tapers[one], maps.run[one]).unit(x)[:, 0]
 
 
 def _is_box(u: Array, run: int) -> bool:
@@ -148,25 +162,26 @@ def _outline(u: Array, run: int, start: float) -> Outline:
 
 
 def _beyond_box(offset: Array32, half: Array32) -> Array32:
-    """``[n]`` distances of points from rectangles; 0 inside."""
-    return _norm(np.maximum(np.abs(offset) - half, 0.0))
+    """``[n]`` distances of points from rectangles, both ``[2, n]``; 0 inside."""
+    return _norm(*np.maximum(np.abs(offset) - half, 0.0))
 
 
 def _beyond_ellipse(offset: Array32, half: Array32) -> Array32:
-    """``[n]`` distances of points from ellipses, nearly; 0 inside.
+    """``[n]`` distances of points from ellipses, both ``[2, n]``, nearly; 0 inside.
 
     To first order in the distance, which falls far short behind a wing, a flat ellipse: there the
     distance from the box around it is better.
     """
     scaled = offset / half
-    reach, slope = _norm(scaled), _norm(scaled / half)
+    reach, slope = _norm(*scaled), _norm(*(scaled / half))
     outside = np.maximum(reach - 1.0, 0.0) * reach
     near = outside / np.where(outside > 0.0, slope, 1.0)
     distance: Array32 = np.maximum(near, _beyond_box(offset, half))
     return distance
 
 
-def _norm(pairs: Array32) -> Array32:
-    """``[n]`` lengths of ``pairs [n, 2]``."""
-    length: Array32 = np.hypot(pairs[:, 0], pairs[:, 1])
+def _norm(a: Array32, b: Array32) -> Array32:
+    """``[n]`` lengths of vectors."""
+    # In a fraction of the time of a hypotenuse that bears numbers beyond 1e18.
+    length: Array32 = np.sqrt(a * a + b * b)
     return length

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+Real = TypeVar("Real", bound=np.floating)
 Array = NDArray[np.float64]
+
+
+def cross(a: NDArray[Real], b: NDArray[Real]) -> NDArray[Real]:
+    """``[3, n]`` cross products of vectors ``[3, n]``, each coordinate an array of its own.
+
+    A fraction of the time that rows of three take.
+    """
+    return np.stack([a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1))])
 
 
 def face_crosses(vertices: Array, faces: NDArray[np.int64]) -> Array:
     """``[F, 3]`` face normals, twice the face's area long."""
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    crosses: Array = np.cross(b - a, c - a)
-    return crosses
+    columns = np.asfortranarray(vertices).T
+    a, b, c = (np.stack([column[corner] for column in columns]) for corner in faces.T)
+    return cross(b - a, c - a).T
 
 
 def vertex_normals(vertices: Array, faces: NDArray[np.int64]) -> Array:

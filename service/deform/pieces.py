@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from service.deform.choice import CARRIED, TOUCH, Cases, choose, mean_distance, realised
 from service.deform.groups import Group
 from service.deform.proximity import Boxes
+from service.deform.weld import runs
 
 Array32 = NDArray[np.float32]
 Index = NDArray[np.int64]
@@ -26,6 +27,8 @@ Mask = NDArray[np.bool_]
 STRETCHED = 0.7
 # The same for a rod along its own axis, such as a spindle, which is held at both ends.
 ROD = (0.1, 0.2)
+# Beyond any unit coordinate.
+FAR = 1e9
 # With more pieces than this, as in a broken scan, each is carried by itself.
 MANY = 1500
 
@@ -73,16 +76,17 @@ def vote(
         hubs: ``[P]`` parts that the others are attached to.
     """
     thin = boxes.thin
-    order = np.argsort(piece, kind="stable")
-    starts = np.flatnonzero(np.diff(piece[order], prepend=-1))
-    u, distances = u[order], distances[order]
-    nearest = np.minimum.reduceat(distances, starts)
-    low, high = _extent(u, None, starts)
-    near = distances <= np.repeat(nearest, np.diff([*starts, len(u)]), axis=0) + np.float32(TOUCH)
-    touch_low, touch_high = _extent(u, near, starts)
+    # Whatever is of vertices has them last from here on, and sorted by their pieces below.
+    order, starts = runs(piece)
+    u = u.transpose(1, 2, 0)
+    distances, to_group = (np.stack([c[order] for c in m.T]) for m in (distances, to_group))
+    counts = np.diff([*starts, len(piece)])
+    nearest = np.minimum.reduceat(distances, starts, axis=1).T
+    far = distances > np.repeat(nearest.T, counts, axis=1) + np.float32(TOUCH)
+    (low, high), (touch_low, touch_high) = _extents(u, order, starts, far)
     made = np.asarray(nearest < TOUCH) & realised(touch_low, touch_high, boxes)
-    cost = mean_distance(to_group[order], starts)
-    free = mean_distance(to_group[order].min(axis=1, keepdims=True), starts)
+    cost = mean_distance(to_group, starts)
+    free = mean_distance(to_group.min(axis=0, keepdims=True), starts)
     cases = Cases(made, nearest, cost, free, high - low, touching)
     shares = choose(cases, groups, boxes, hubs)
     skin = _skin(cost, groups, boxes)
@@ -122,10 +126,23 @@ def _by_part(values: Array32, groups: list[Group]) -> Array32:
     return columns
 
 
-def _extent(u: Array32, mask: Mask | None, starts: Index) -> tuple[Array32, Array32]:
-    low = u if mask is None else np.where(mask[:, :, None], u, np.float32(np.inf))
-    high = u if mask is None else np.where(mask[:, :, None], u, np.float32(-np.inf))
-    return np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
+def _extents(u: Array32, order: Index, starts: Index, far: Mask) -> tuple[Array32, Array32]:
+    """Low and high ends of pieces, and of what is not far of them, both ``[2, pieces, P, 3]``.
+
+    Args:
+        u: ``[P, 3, n]``.
+        order, starts: of the pieces; see `runs`.
+        far: ``[P, n]``, in that order.
+    """
+    whole, near = np.empty((2, 2, len(starts), *u.shape[:2]), np.float32)
+    for part, beyond in enumerate(far * np.float32(FAR)):
+        for axis in range(3):
+            own = u[part, axis][order]
+            whole[0, :, part, axis] = np.minimum.reduceat(own, starts)
+            whole[1, :, part, axis] = np.maximum.reduceat(own, starts)
+            near[0, :, part, axis] = np.minimum.reduceat(own + beyond, starts)
+            near[1, :, part, axis] = np.maximum.reduceat(own - beyond, starts)
+    return whole, near
 
 
 def _stretch(fill: Array32, carried: float, stretched: float) -> Array32:

@@ -17,11 +17,19 @@ Array32 = NDArray[np.float32]
 # How much of the distance to a part counts for a vertex between the mirrored parts of a group,
 # such as one of a stretcher between legs.
 BETWEEN = 0.5
-# Distance over which a part's hold on its surroundings fades, and how fast.
+# Distance over which a part's hold on its surroundings fades.
 BAND = 0.02
-POWER = 6
 # An axis counts as thin under this share of the part's longest.
 THIN = 0.4
+
+
+# Vertices at a time, so that what is worked out of them stays in the processor's cache.
+BLOCK = 16384
+
+
+def blocks(count: int) -> list[slice]:
+    """Slices of so many vertices, one after another."""
+    return [slice(start, min(start + BLOCK, count)) for start in range(0, count, BLOCK)]
 
 
 @dataclass(frozen=True)
@@ -61,22 +69,40 @@ class Boxes:
         return long
 
     def local(self, x: Array) -> Array32:
-        """Unit coordinates ``[V, P, 3]`` of ``x [V, 3]``."""
-        maps = self.inverses.transpose(2, 0, 1).reshape(3, -1)
-        shift = np.einsum("pij,pj->pi", self.inverses, self.frames[:, :, 3]).reshape(-1)
-        u = (x @ maps - shift).astype(np.float32).reshape(len(x), -1, 3)
-        for part, loft in self.lofts.items():
-            if loft.tapered:
-                u[:, part] = loft.unit(x)
+        """Unit coordinates ``[V, P, 3]`` of ``x [V, 3]``, each one in a run of memory of its own.
+
+        Here and below it is the loops over these runs that make a large mesh quick to bind.
+        """
+        u = np.empty((len(self.frames), 3, len(x)), np.float32)
+        columns = np.ascontiguousarray(x.T)
+        for rows in blocks(len(x)):
+            for part, own in enumerate(u):
+                own[:, rows] = self.unit(part, columns[:, rows])
+        return u.transpose(2, 0, 1)
+
+    def unit(self, part: int, x: Array) -> Array32:
+        """Unit coordinates ``[3, n]`` in one part of ``x [3, n]``."""
+        if part in self.lofts and self.lofts[part].tapered:
+            return self.lofts[part].unit(x.T).T
+        u = np.empty(x.shape, np.float32)
+        for own, row in zip(u, self.inverses[part], strict=True):
+            terms = [row[k] * x[k] for k in np.flatnonzero(row)]
+            own[:] = sum(terms) - row @ self.frames[part, :, 3]
         return u
 
     def distances(self, u: Array32) -> Array32:
         """Distances ``[V, P]`` to the parts of points with unit coordinates ``u [V, P, 3]``."""
-        beyond = np.maximum(np.abs(u) - np.float32(0.5), 0.0) * self.sizes.astype(np.float32)
-        distances: Array32 = np.sqrt(np.einsum("vpk,vpk->vp", beyond, beyond))
-        for part, loft in self.lofts.items():
-            distances[:, part] = loft.distance(u[:, part])
-        return distances
+        distances = np.empty((u.shape[1], len(u)), np.float32)
+        sizes = self.sizes.astype(np.float32)
+        for rows in blocks(len(u)):
+            for part, size in enumerate(sizes):
+                if part in self.lofts:
+                    distances[part, rows] = self.lofts[part].distance(u[rows, part])
+                    continue
+                beyond = np.maximum(np.abs(u[rows, part].T) - np.float32(0.5), 0.0)
+                beyond *= size[:, None]
+                np.sqrt(np.square(beyond, out=beyond).sum(axis=0), out=distances[part, rows])
+        return distances.T
 
     def runs_along(self, part: int, axis: int) -> bool:
         """Whether a part lies along an axis of space, as a wing does: its image across that axis
@@ -101,15 +127,17 @@ class Boxes:
 def nearness(to_group: Array32, band: Array32 | float = BAND) -> Array32:
     """``[V, G]`` smooth shares of the groups, one in sum, from the distances to them.
 
-    Inverse powers, not a Gaussian: between parts far off, such as along an arm between seat and
-    back, the shares pass over as slowly as the distances are large.
+    Inverse sixth powers, not a Gaussian: between parts far off, such as along an arm between seat
+    and back, the shares pass over as slowly as the distances are large.
 
     Args:
         to_group: ``[V, G]``.
         band: distance over which a group's hold fades, ``[V, G]`` or one for all.
     """
     least = to_group.min(axis=1, keepdims=True)
-    near = ((least + band) / (to_group + band)) ** POWER
+    near = (least + band) / (to_group + band)
+    cubed = near * near * near
+    near = cubed * cubed
     return near / near.sum(axis=1, keepdims=True)
 
 
@@ -119,11 +147,15 @@ def group_distance(x: Array, distances: Array32, boxes: Boxes, group: Group) -> 
     What is between wings is the fuselage's: for them it is the distance to the nearest.
     """
     members = list(group.members)
-    nearest = distances[:, members].min(axis=1)
+    nearest = distances[:, members[0]]
+    for part in members[1:]:
+        nearest = np.minimum(nearest, distances[:, part])
     if len(members) == 1 or boxes.end_to_end(group):
         return nearest
     half = 0.5 * np.abs(boxes.frames[members, :, :3]).sum(axis=2)
     center = boxes.frames[members, :, 3]
     low, high = (center - half).min(axis=0), (center + half).max(axis=0)
-    hull = np.linalg.norm(np.maximum(np.maximum(low - x, x - high), 0.0), axis=1)
-    return np.minimum(nearest, hull.astype(np.float32) + np.float32(BETWEEN) * nearest)
+    hull = np.zeros(len(x))
+    for coordinate, below, above in zip(x.T, low, high, strict=True):
+        hull += (coordinate - np.clip(coordinate, below, above)) ** 2
+    return np.minimum(nearest, np.sqrt(hull, dtype=np.float32) + np.float32(BETWEEN) * nearest)

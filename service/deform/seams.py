@@ -9,7 +9,6 @@ rest.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +20,11 @@ from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
+Mask = NDArray[np.bool_]
 
 # The most of a part that one strip may take.
 WIDEST = 0.4
+SIDES = (-1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -33,16 +34,23 @@ class Seams:
     low: Array32
     high: Array32
 
-    def carry(self, u: Array32) -> tuple[Array32, Array32]:
-        """Unit coordinates ``[n, P, 3]`` with the strips pressed to the sides, and the slope.
+    def carry(self, u: Array32, gains: Array32, free: Mask) -> None:
+        """Press the strips to the sides, in place.
 
-        Beyond the part's box coordinates are as they were.
+        Beyond the part's box coordinates stay as they are.
+
+        Args:
+            u, gains: ``[n, P, 3]`` unit coordinates and how far they follow the part.
+            free: ``[n]`` the vertices that are carried like this.
         """
-        slope = 1.0 / (self.high - self.low)
-        inner = (u - self.low) * slope - np.float32(0.5)
-        beyond = u - np.clip(u, -0.5, 0.5)
-        gain = np.where((u > self.low) & (u < self.high), slope, (beyond != 0.0).astype(np.float32))
-        return np.clip(inner, -0.5, 0.5) + beyond, gain
+        for part, axis in np.argwhere((self.low > -0.5) | (self.high < 0.5)):
+            own, low, high = u[:, part, axis], self.low[part, axis], self.high[part, axis]
+            slope = np.float32(1.0) / (high - low)
+            within = np.clip(own, -0.5, 0.5)
+            pressed = np.clip((own - low) * slope - np.float32(0.5), -0.5, 0.5) + (own - within)
+            gain = np.where((own > low) & (own < high), slope, (own != within).astype(np.float32))
+            np.copyto(own, pressed, where=free)
+            np.multiply(gains[:, part, axis], gain, out=gains[:, part, axis], where=free)
 
 
 def flush_seams(template: AffineTemplate, boxes: Boxes, spines: dict[int, Spine]) -> Seams:
@@ -53,18 +61,20 @@ def flush_seams(template: AffineTemplate, boxes: Boxes, spines: dict[int, Spine]
     """
     affine = offered_rows(template)
     frames, rounded = boxes.frames, boxes.rounded
+    flush = _flush(affine)
     low, high = np.full((len(frames), 3), -0.5), np.full((len(frames), 3), 0.5)
     for part, axis in np.ndindex(len(frames), 3):
         row = affine[part, axis]
         # Only axes that the part's frame doesn't turn.
         if rounded[part] or not row[axis].any() or np.delete(row[:3], axis, 0).any():
             continue
-        for other, side in product(np.flatnonzero(~rounded).tolist(), (-1.0, 1.0)):
-            if other == part or not _flush(row, affine[other, axis], axis, side):
+        for n, other in np.argwhere(flush[:, axis, part] & ~rounded).tolist():
+            if other == part:
                 continue
+            side = SIDES[n]
             run, spine = int(template.run[other]), spines.get(other)
             inner = _inner_face(frames[other], axis, side, run, spine)
-            edge = float(boxes.local(inner[None])[0, part, axis])
+            edge = float(boxes.unit(part, inner[:, None])[axis, 0])
             # A mirrored part's own axis points the other way.
             if side * frames[part, axis, axis] < 0 and edge + 0.5 <= WIDEST:
                 low[part, axis] = max(low[part, axis], edge)
@@ -73,11 +83,12 @@ def flush_seams(template: AffineTemplate, boxes: Boxes, spines: dict[int, Spine]
     return Seams(low.astype(np.float32), high.astype(np.float32))
 
 
-def _flush(row: Array, beside: Array, axis: int, side: float) -> bool:
-    """Whether two parts' rows ``[4, 1 + d]`` of an axis put their faces of a side in one place."""
-    return np.allclose(
-        row[3] + side * 0.5 * np.abs(row[axis]), beside[3] + side * 0.5 * np.abs(beside[axis])
-    )
+def _flush(affine: Array) -> Mask:
+    """``[2, 3, P, P]`` whether two parts, whose rows ``[P, 3, 4, 1 + d]`` are given, have their
+    faces of a side and an axis in one place."""
+    half = 0.5 * np.abs(np.diagonal(affine[:, :, :3], axis1=1, axis2=2)).transpose(0, 2, 1)
+    faces = np.stack([affine[:, :, 3] + side * half for side in SIDES]).swapaxes(1, 2)
+    return np.asarray(np.isclose(faces[:, :, :, None], faces[:, :, None]).all(axis=-1))
 
 
 def _inner_face(frame: Array, axis: int, side: float, run: int, spine: Spine | None) -> Array:

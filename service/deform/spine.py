@@ -52,7 +52,8 @@ def straighten(
             run = boxes.lofts[part].run if boxes.rounded[part] else 1
             spine = measure_spine(u[:, part], faces, boxes.sizes[part], mirrored, run)
             if spine is not None:
-                u[:, part, list(spine.thin)] -= spine.shift(u[:, part])
+                for axis, shift in zip(spine.thin, spine.shift(u[:, part]).T, strict=True):
+                    u[:, part, axis] -= shift
                 spines[part] = spine
     return spines
 
@@ -79,7 +80,7 @@ def measure_spine(
     near = _near(u, faces, size, run)
     if not len(near):
         return None
-    samples = _samples(u.astype(np.float64), near, size, mirrored, run, wide, thin)
+    samples = _samples(*_alone(u, near), size, mirrored, run, wide, thin)
     return fit_spine(*samples, size, run, wide, thin)
 
 
@@ -89,9 +90,24 @@ def _near(u: NDArray[np.float32], faces: Index, size: Array, run: int) -> Index:
     reach[run] = 0.5
     # One bit for each side of the surroundings that a vertex is beyond: a face is away when all
     # of its corners are beyond the same side.
-    beyond = np.packbits(np.concatenate([u < -reach, u > reach], axis=1), axis=1)[:, 0]
-    a, b, c = beyond[faces.T]
-    return faces[(a & b & c) == 0]
+    beyond = np.zeros(len(u), np.uint8)
+    for axis in range(3):
+        beyond |= (u[:, axis] < -reach[axis]).view(np.uint8) << 2 * axis
+        beyond |= (u[:, axis] > reach[axis]).view(np.uint8) << 2 * axis + 1
+    a, b, c = (np.take(beyond, corner) for corner in faces.T)
+    near = np.flatnonzero((a & b & c) == 0)
+    return np.stack([np.take(corner, near) for corner in faces.T], axis=1)
+
+
+def _alone(u: NDArray[np.float32], faces: Index) -> tuple[Array, Index]:
+    """The vertices of some faces, in their order, and the faces with indices into them."""
+    used = np.zeros(len(u), bool)
+    for corner in faces.T:
+        used[corner] = True
+    vertex = np.flatnonzero(used)
+    place = np.empty(len(u), np.int64)
+    place[vertex] = np.arange(len(vertex))
+    return np.stack([column[vertex] for column in u.T], axis=1).astype(np.float64), place[faces]
 
 
 def _samples(

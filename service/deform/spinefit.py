@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,15 +38,23 @@ class Spine:
 
     def shift(self, u: NDArray[np.float32]) -> NDArray[np.float32]:
         """``[n, len(thin)]`` middle at the long coordinates of ``u [n, 3]``, bilinear."""
-        grid = self.middle.astype(np.float32)
         i, s = _cell(u[:, self.run], LEVELS)
-        rows = grid[i] * (1 - s)[:, None, None] + grid[i + 1] * s[:, None, None]
-        if self.wide is None:
-            return rows[:, 0]
-        j, r = _cell(u[:, self.wide], COLUMNS)
-        row = np.arange(len(u))
-        shift = rows[row, j] * (1 - r)[:, None] + rows[row, j + 1] * r[:, None]
-        return shift.astype(np.float32, copy=False)
+        if self.wide is not None:
+            j, r = _cell(u[:, self.wide], COLUMNS)
+        columns = self.middle.shape[1]
+        shift = np.empty((len(self.thin), len(u)), np.float32)
+        for row, grid in zip(shift, self.middle.T.astype(np.float32), strict=True):
+            levels = np.ascontiguousarray(grid.T).ravel()
+
+            def at(start: Index, levels: NDArray[np.float32] = levels) -> NDArray[np.float32]:
+                return levels[start] * (1 - s) + levels[start + columns] * s
+
+            if self.wide is None:
+                row[:] = at(i)
+            else:
+                start = i * columns + j
+                row[:] = at(start) * (1 - r) + at(start + 1) * r
+        return shift.T
 
 
 def centers(count: int) -> Array:
@@ -54,9 +63,9 @@ def centers(count: int) -> Array:
 
 def _cell(u: NDArray[np.float32], count: int) -> tuple[Index, NDArray[np.float32]]:
     """The cell of each coordinate and the place in it; straight on to the part's very ends."""
-    at = np.clip((u + np.float32(0.5)) * count - np.float32(0.5), -0.5, count - 0.5)
-    index = np.clip(np.floor(at), 0, count - 2).astype(np.int64)
-    return index, (at - index).astype(np.float32)
+    at = np.clip((u + np.float32(0.5)) * np.float32(count) - np.float32(0.5), -0.5, count - 0.5)
+    start = np.clip(np.floor(at), 0, count - 2)
+    return start.astype(np.int64), at - start
 
 
 def fit_spine(
@@ -135,14 +144,19 @@ def _choose(cells: Index, merit: Array, columns: int) -> tuple[Index, Array]:
 
 def _smooth(middle: Array, weight: Array) -> Array:
     """The smooth surface through the measured cells that passes straight over the others."""
-    rows, columns = weight.shape
+    system = np.diag(weight.ravel()) + _roughness(*weight.shape)
+    target = (weight[..., None] * middle).reshape(weight.size, -1)
+    return np.asarray(np.linalg.solve(system, target)).reshape(middle.shape)
+
+
+@cache
+def _roughness(rows: int, columns: int) -> Array:
+    """The quadratic form that tells how much a surface on the grid bends, and a little how much it
+    rises."""
     bend = [np.kron(_second(rows), np.eye(columns)), np.kron(np.eye(rows), _second(columns))]
     step = [np.kron(_first(rows), np.eye(columns)), np.kron(np.eye(rows), _first(columns))]
-    system = np.diag(weight.ravel())
-    for rough, strength in ((bend, STIFFNESS), (step, 0.01)):
-        system = system + strength * sum(d.T @ d for d in rough)
-    target = (weight[..., None] * middle).reshape(rows * columns, -1)
-    return np.asarray(np.linalg.solve(system, target)).reshape(middle.shape)
+    terms = [STIFFNESS * d.T @ d for d in bend] + [0.01 * d.T @ d for d in step]
+    return np.asarray(sum(terms))
 
 
 def _first(count: int) -> Array:

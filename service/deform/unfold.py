@@ -19,11 +19,14 @@ from scipy.sparse.csgraph import connected_components
 
 from service import deadline
 from service.deform.binding import Binding
-from service.deform.flips import flipped
-from service.deform.weld import Welded, weld
+from service.deform.gradient import Gradient
+from service.deform.patch import Patch, Patches
+from service.deform.turning import Turning
+from service.deform.weld import weld
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 STRONG = (0.7, 1.4)
 """Edits that a bound mesh should take without folding, as factors of a parameter."""
@@ -33,10 +36,10 @@ RELAXATIONS = 30
 """Rounds of evening out around folds; each reaches one ring of vertices further."""
 SWEEPS = 15
 """Averaging steps a round."""
+HOPELESS = (15, 20)
+"""After so many rounds, so many times more folds than at best: no repair has recovered from it."""
 FARTHEST = 0.03
 """Normalised length by which a repair may move a vertex along an axis in a strong edit."""
-RINGS = 32
-"""Rings of faces around folds within which a repair may move anything."""
 
 
 def unfold(
@@ -52,78 +55,31 @@ def unfold(
         parameters: indices of those to look after.
     """
     jacobian = binding.jacobian
-    welded: Welded | None = None
+    welded = binding.welded or weld(vertices, faces)
+    turning, patches = Turning(welded.vertices, welded.faces), Patches(welded)
+    shares = [k - 1.0 for k in STRONG]
     for index in parameters:
         deadline.check()
-        changes = [np.where(np.arange(len(f)) == index, (k - 1) * f, 0.0) for k in STRONG]
-        maps = [binding.linear(change) for change in changes]
-        folded = np.zeros(len(faces), bool)
-        for change, map_ in zip(changes, maps, strict=True):
-            folded |= flipped(vertices, vertices + binding.displace(change), faces, map_)
+        steps = [share * float(f[index]) for share in shares]
+        motion = {axis: jacobian[welded.rows, axis, index] for axis in range(3)}
+        motion = {axis: column for axis, column in motion.items() if column.any()}
+        if not motion:
+            continue
+        gradient = binding.gradient(index, welded.rows)
+        wild = gradient.wild(float(f[index]), shares)
+        folded = turning.folded(motion, gradient, wild, steps)
         if not folded.any():
             continue
-        welded = welded or weld(vertices, faces)
-        patch = _Patch.around(welded, folded)
-        at = np.zeros(len(welded.vertices), np.int64)
-        at[welded.of] = np.arange(len(vertices))
-        rows = at[patch.vertex]
-        folds = _Folds(patch, [float(change[index]) for change in changes], [m[rows] for m in maps])
-        repaired = jacobian[at, :, index]
-        repaired[patch.vertex] = _repaired(folds, repaired[patch.vertex].astype(np.float64))
-        jacobian = jacobian.copy() if jacobian is binding.jacobian else jacobian
-        jacobian[:, :, index] = repaired[welded.of]
+        patch = patches.around(np.asarray(folded.any(axis=0)))
+        folds = _Folds(patch, tuple(motion), gradient.of(patch.vertex), wild[patch.vertex], steps)
+        column = np.stack([values[patch.vertex] for values in motion.values()])
+        jacobian = jacobian.copy(order="K") if jacobian is binding.jacobian else jacobian
+        repaired = _repaired(folds, column.astype(np.float64))
+        for (axis, values), better in zip(motion.items(), repaired, strict=True):
+            whole = values.copy()
+            whole[patch.vertex] = better
+            jacobian[:, axis, index] = whole[welded.of]
     return replace(binding, jacobian=jacobian)
-
-
-@dataclass(frozen=True)
-class _Patch:
-    """The part of a welded mesh that lies around some of its faces.
-
-    Attributes:
-        vertices, faces: of the patch.
-        vertex: ``[n]`` which vertex of the whole each is.
-        inner: ``[n]`` bool, those all of whose faces are in the patch: only they may move.
-    """
-
-    vertices: Array
-    faces: Index
-    vertex: Index
-    inner: NDArray[np.bool_]
-
-    @classmethod
-    def around(cls, welded: Welded, folded: NDArray[np.bool_]) -> _Patch:
-        """The faces within `RINGS` rings of the folded ones."""
-        inner = np.zeros(len(welded.vertices), bool)
-        touched: NDArray[np.bool_] = folded
-        for _ in range(RINGS):
-            inner[welded.faces[touched].ravel()] = True
-            touched = np.asarray(inner[welded.faces].any(axis=1))
-        faces = welded.faces[touched]
-        vertex, local = np.unique(faces, return_inverse=True)
-        return cls(welded.vertices[vertex], local.reshape(-1, 3), vertex, inner[vertex])
-
-    @cached_property
-    def edges(self) -> Index:
-        """``[F, 3, 2]`` the ends of each face's sides."""
-        return np.stack([self.faces, self.faces[:, [1, 2, 0]]], axis=2)
-
-    @cached_property
-    def shortest(self) -> Index:
-        """``[F, 2]`` the ends of each face's shortest side."""
-        ends = self.vertices[self.edges]
-        lengths = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
-        return self.edges[np.arange(len(self.faces)), lengths.argmin(axis=1)]
-
-    @cached_property
-    def averaging(self) -> csr_array:
-        """``[n, n]`` each vertex to the mean of its neighbours."""
-        ends = self.edges.reshape(-1, 2)
-        ends = np.concatenate([ends, ends[:, ::-1]])
-        count = len(self.vertices)
-        graph = csr_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
-        graph.data[:] = 1.0
-        degree = np.asarray(graph.sum(axis=1)).ravel()
-        return graph.multiply(1.0 / np.maximum(degree, 1.0)[:, None]).tocsr()
 
 
 @dataclass(frozen=True)
@@ -132,43 +88,50 @@ class _Folds:
 
     Attributes:
         patch: of the mesh.
+        axes: along which the parameter moves anything.
+        gradient: how it changes the maps, on the patch.
+        wild: ``[n]`` of `Gradient.wild`.
         steps: the parameter's changes.
-        maps: ``[n, 3, 3]`` local linear maps of each.
     """
 
-    patch: _Patch
+    patch: Patch
+    axes: tuple[int, ...]
+    gradient: Gradient
+    wild: Mask
     steps: list[float]
-    maps: list[NDArray[np.floating]]
 
-    def __call__(self, column: Array) -> tuple[int, NDArray[np.bool_]]:
+    @cached_property
+    def _turning(self) -> Turning:
+        return Turning(self.patch.vertices, self.patch.faces)
+
+    def __call__(self, column: Array) -> tuple[int, Mask]:
         """The most faces that one edit folds, and ``[F]`` those that either does."""
-        x, faces = self.patch.vertices, self.patch.faces
-        folded = [
-            flipped(x, x + step * column, faces, maps)
-            for step, maps in zip(self.steps, self.maps, strict=True)
-        ]
-        return max(int(mask.sum()) for mask in folded), np.logical_or(*folded)
+        motion = dict(zip(self.axes, column, strict=True))
+        folded = self._turning.folded(motion, self.gradient, self.wild, self.steps)
+        return int(folded.sum(axis=1).max()), np.asarray(folded.any(axis=0))
 
 
 def _repaired(folds: _Folds, column: Array) -> Array:
-    """The candidate for a Jacobian's ``column [n, 3]`` that folds the fewest faces."""
+    """The candidate for a Jacobian's ``column [axes, n]`` that folds the fewest faces."""
     best, (least, folded) = column, folds(column)
     reach = FARTHEST / max(abs(step) for step in folds.steps)
     for repair in (_merged, _relaxed):
-        for candidate, count in repair(folds, column, folded, reach):
+        for turn, (candidate, count) in enumerate(repair(folds, column, folded, reach), start=1):
             deadline.check()
             if count < least:
                 best, least = candidate, count
             if least == 0:
                 return best
+            if turn >= HOPELESS[0] and count > HOPELESS[1] * least:
+                break
     return best
 
 
 def _merged(
-    folds: _Folds, column: Array, folded: NDArray[np.bool_], reach: float
+    folds: _Folds, column: Array, folded: Mask, reach: float
 ) -> Iterator[tuple[Array, int]]:
     """Let the ends of folded faces' shortest edges move as one, round after round."""
-    patch, size = folds.patch, len(column)
+    patch, size = folds.patch, column.shape[1]
     pairs = np.empty((0, 2), np.int64)
     for _ in range(MERGES):
         short = patch.shortest[folded]
@@ -176,18 +139,18 @@ def _merged(
         graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
         label = connected_components(graph, directed=False)[1]
         members = np.bincount(label)
-        means = [np.bincount(label, values) / members for values in column.T]
-        candidate = np.clip(np.stack(means, axis=1)[label], column - reach, column + reach)
+        means = np.stack([np.bincount(label, values) / members for values in column])
+        candidate = np.clip(means[:, label], column - reach, column + reach)
         count, folded = folds(candidate)
         yield candidate, count
 
 
 def _relaxed(
-    folds: _Folds, column: Array, folded: NDArray[np.bool_], reach: float
+    folds: _Folds, column: Array, folded: Mask, reach: float
 ) -> Iterator[tuple[Array, int]]:
     """Average over the neighbours in a region around the folds that grows each round."""
     patch = folds.patch
-    region = np.zeros(len(column), bool)
+    region = np.zeros(column.shape[1], bool)
     candidate = column
     for _ in range(RELAXATIONS):
         region[patch.faces[folded].ravel()] = True
@@ -195,8 +158,9 @@ def _relaxed(
         rows = np.flatnonzero(region & patch.inner)
         local = patch.averaging[rows]
         candidate = candidate.copy()
-        for _ in range(SWEEPS):
-            candidate[rows] = local @ candidate
+        for values in candidate:
+            for _ in range(SWEEPS):
+                values[rows] = local @ values
         candidate = np.clip(candidate, column - reach, column + reach)
         count, folded = folds(candidate)
         yield candidate, count

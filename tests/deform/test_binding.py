@@ -24,3 +24,12 @@ def test_inverse_frames_invert_and_bear_flat_parts():
     product = inverse_frames(frames) @ frames[:, :, :3]
     np.testing.assert_allclose(product, np.broadcast_to(np.eye(3), (6, 3, 3)), atol=1e-9)
     assert np.isfinite(inverse_frames(template.frames(np.zeros(8)))).all()
+
+
+def test_displacements_are_the_jacobians_and_nothing_else_moves():
+    binding = bind(*template_mesh(), chair(), PARAMETERS, ORIGIN)
+    df = 0.1 * PARAMETERS
+    np.testing.assert_allclose(binding.displace(df), binding.jacobian @ df, atol=1e-6)
+    wider = binding.displace(np.where(np.arange(8) == 4, 0.1, 0.0))
+    assert wider[:, 0].any()
+    assert not wider[:, 1:].any()

@@ -27,6 +27,18 @@ def test_the_seat_then_moves_with_the_leg_below_it():
     lw, w = PARAMETERS[[7, 4]]
     u = np.zeros((4, 6, 3), np.float32)
     u[:, 0, 0] = [0.0, 0.5 - lw / w, 0.5, 0.7]
-    carried, gain = seams.carry(u)
+    carried, gain = u.copy(), np.ones_like(u)
+    seams.carry(carried, gain, np.ones(4, bool))
     np.testing.assert_allclose(carried[:, 0, 0], [0.0, 0.5, 0.5, 0.7], atol=1e-6)
     np.testing.assert_allclose(gain[[0, 3], 0, 0], [0.5 / (0.5 - lw / w), 1.0], atol=1e-6)
+
+
+def test_what_goes_with_one_part_is_left_as_it_is():
+    seams = flush_seams(chair(), boxes(), {})
+    u = np.full((2, 6, 3), 0.45, np.float32)
+    gain = np.ones_like(u)
+    seams.carry(u, gain, np.array([True, False]))
+    assert u[0, 0, 0] > 0.45
+    assert gain[0, 0, 0] == 0.0
+    np.testing.assert_array_equal(u[1], np.float32(0.45))
+    np.testing.assert_array_equal(gain[1], 1.0)
