@@ -61,6 +61,10 @@ def _names(template: AffineTemplate) -> Iterator[Mistake]:
             yield Mistake(f"parameters {name}", "use small letters, digits and _ in the name")
     for name in set(template.names) & set(template.derived):
         yield Mistake(f"derived {name}", "is a parameter's name too: rename one of them")
+    for name, dimension in template.derived.items():
+        if dimension.on is not None and dimension.on not in template.parts:
+            text = f"no part is named {dimension.on!r}: name one of `parts` in `measure`"
+            yield Mistake(f"derived {name}", text)
     for parameter in template.parameters:
         low, high = parameter.typical
         if not low < high:

@@ -9,21 +9,34 @@ from numpy.typing import NDArray
 
 from service import deadline
 from service.affineinference import AffineInference
+from service.conflict import conflict_error
+from service.constraints import NONE, Interval
 from service.deform import blend, paper
 from service.deform.admissible import unusual
 from service.deform.binding import Binding
-from service.deform.dimensions import Outcome
+from service.deform.demands import Unsatisfiable
+from service.deform.dimensions import Dimensions
 from service.deform.followers import following
+from service.deform.measured import find_levels
+from service.deform.outcome import Outcome
+from service.deform.readings import APART
 from service.deform.unfold import unfold
-from service.edited import Moved, Shift
+from service.edited import Measured, Moved, Shift
 from service.edits import Change
 from service.requests import EditOptions
 
 Array = NDArray[np.float64]
 
+NOTED = 0.02
+"""Share of a dimension by which the fit may be off the mesh without remark."""
+
 
 def move(
-    found: AffineInference, edits: Mapping[str, Change], options: EditOptions, keep: str
+    found: AffineInference,
+    edits: Mapping[str, Change],
+    options: EditOptions,
+    keep: str,
+    constraints: Mapping[str, Interval] = NONE,
 ) -> Moved:
     """Carry out an edit.
 
@@ -32,37 +45,49 @@ def move(
         edits: by parameter or derived dimension.
         options: how.
         keep: the point that stays in place.
+        constraints: likewise by name; what edits name stays as they have it.
 
     Raises:
-        InvalidRequest: for an edit that can't be made.
+        InvalidRequest: for an edit that can't be made, or constraints that conflict.
     """
-    binding = _bind(found, options.mode)
+    fit = found.fit
+    binding = bind(found, options.mode)
+    levels = find_levels(
+        found.vertices, found.mesh.faces, fit.template, fit.parameters, fit.translation
+    )
     deadline.check()
-    after = found.dimensions(binding.jacobian).after(edits)
-    if options.mode == "blend":
-        changed = np.flatnonzero(after != found.parameters).tolist()
-        binding = unfold(binding, found.vertices, found.mesh.faces, found.fit.parameters, changed)
-    dimensions = found.dimensions(binding.jacobian)
-    outcome = dimensions.outcome(edits, options.strict)
-    after = outcome.parameters
-    change = np.where(after == found.parameters, 0.0, (after - found.parameters) * found.scale)
-    _, anchor = found.fit.template.anchor(keep)
-    turn, scale = found.best.orientation, found.fit.normalization.scale
+    try:
+        first = found.dimensions(binding.jacobian, levels).outcome(edits, constraints=constraints)
+        if options.mode == "blend":
+            changed = np.flatnonzero(first.change).tolist()
+            binding = unfold(binding, found.vertices, found.mesh.faces, fit.parameters, changed)
+        dimensions = found.dimensions(binding.jacobian, levels)
+        outcome = dimensions.outcome(edits, options.strict, constraints)
+    except Unsatisfiable as conflict:
+        raise conflict_error(conflict, lambda _: found.unit) from conflict
+    change = outcome.change * found.scale
+    _, anchor = fit.template.anchor(keep)
+    turn, scale = found.best.orientation, fit.normalization.scale
     shift = turn.to_own((binding.displace(change) - anchor @ change) / scale)
     linear = turn.maps_to_own(binding.linear(change))
     deadline.check()
-    before, now = found.dimensions().derived(found.parameters), dimensions.derived(after)
+    before = found.dimensions().derived(found.parameters)
     return Moved(
         found,
-        _parameters(found, after),
-        [Shift(name, old, now[name], found.unit) for name, old in before.items()],
+        _parameters(found, outcome.parameters),
+        [Shift(name, old, outcome.derived[name], found.unit) for name, old in before.items()],
+        [
+            Measured(name, *values, found.unit, outcome.asked.get(name))
+            for name, values in dimensions.measured(outcome.change).items()
+        ],
         found.mesh.vertices + shift,
         linear,
-        _warnings(found, outcome),
+        [*_warnings(found, outcome), *_measures(found, dimensions, outcome)],
     )
 
 
-def _bind(found: AffineInference, mode: str) -> Binding:
+def bind(found: AffineInference, mode: str) -> Binding:
+    """The upload, bound to its fitted template by the rule of a mode."""
     rule = blend.bind if mode == "blend" else paper.bind
     fit = found.fit
     template = following(fit.template, fit.parameters)
@@ -98,4 +123,27 @@ def _warnings(found: AffineInference, outcome: Outcome) -> list[str]:
         f"{name} is outside of what the model was trained on, for the rest of the shape"
         for name in unusual(template, before, after)
     ]
+    return warnings
+
+
+def _measures(found: AffineInference, dimensions: Dimensions, outcome: Outcome) -> list[str]:
+    """What to say where a dimension that was asked for is another on the mesh than in the fit."""
+    warnings = []
+    for name, reading in dimensions.readings.items():
+        if name not in outcome.asked or reading.dimension.on is None:
+            continue
+        if reading.mesh is None:
+            warnings.append(f"{name} can't be measured on this mesh: the edit goes by the fit")
+            continue
+        measured = reading.mesh.value(np.zeros_like(found.parameters))
+        values = (
+            f"{measured:.4g} {found.unit} on the mesh before the edit, and {reading.fitted:.4g} "
+            "in the fit"
+        )
+        if not reading.corrects:
+            far = abs(measured - reading.fitted) > APART * reading.fitted
+            why = "too far apart" if far else "this mesh does not follow the parameters behind it"
+            warnings.append(f"{name} is {values}; {why}: the edit goes by the fit")
+        elif abs(measured - reading.fitted) > NOTED * reading.fitted:
+            warnings.append(f"{name} is {values}: the edit goes by the mesh")
     return warnings

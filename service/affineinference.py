@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.deform.dimensions import Dimensions
+from service.deform.measured import Level
 from service.encode.affinemodel import AffineModel
 from service.encode.estimate import Estimate
 from service.inference import Inference
@@ -40,10 +42,15 @@ class AffineInference(Inference):
         """``[d]`` in the reported unit."""
         return self.fit.parameters / self.scale
 
-    def dimensions(self, jacobian: NDArray[np.floating] | None = None) -> Dimensions:
-        """The mesh's dimensions in the reported unit; with a Jacobian, as they can be changed."""
+    def dimensions(
+        self,
+        jacobian: NDArray[np.floating] | None = None,
+        levels: Mapping[str, Level] | None = None,
+    ) -> Dimensions:
+        """The mesh's dimensions in the reported unit; with a Jacobian, as they can be changed, and
+        with levels, as the mesh itself has them."""
         template = self.fit.template
-        return Dimensions(template, self.parameters, self.vertices, self.scale, jacobian)
+        return Dimensions(template, self.parameters, self.vertices, self.scale, jacobian, levels)
 
     def parameter_report(self) -> dict[str, dict[str, Any]]:
         template = self.model.template

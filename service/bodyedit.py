@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from service import deadline
+from service.bodyconstraints import STATURE, TALLER, constrain
 from service.bodyinference import PARAMETER_UNITS, BodyInference
+from service.constraints import NONE, Interval
 from service.deform import bodypaper, skinbinding
-from service.edited import Moved, Shift
+from service.edited import Measured, Moved, Shift
 from service.edits import Change
 from service.encode.bodymodel import SPREAD, stature
 from service.errors import InvalidRequest
@@ -24,13 +26,14 @@ Array = NDArray[np.float64]
 
 ANGLES = 3 * len(JOINTS)
 """Parameters that are angles; the shape coefficients come behind them."""
-STATURE = "stature"
-TALLER = NAMES[ANGLES]
-"""The coefficient that a change of the stature changes."""
 
 
 def move(
-    found: BodyInference, edits: Mapping[str, Change], options: EditOptions, keep: str
+    found: BodyInference,
+    edits: Mapping[str, Change],
+    options: EditOptions,
+    keep: str,
+    constraints: Mapping[str, Interval] = NONE,
 ) -> Moved:
     """Carry out an edit.
 
@@ -40,12 +43,17 @@ def move(
         options: how.
         keep: what stays in place when the shape changes: the ``pelvis``, or the ``floor`` that the
             body stands on.  A change of the pose alone leaves the pelvis where it is.
+        constraints: likewise by name; what edits name stays as they have it.
 
     Raises:
-        InvalidRequest: for an unknown name, or a stature that can't be had.
+        InvalidRequest: for an unknown name, a stature that can't be had, or constraints that
+            conflict.
     """
     template, before = found.model.template, found.fit.body
+    _require_known(found, (*edits, *constraints))
     values = _values(found, edits)
+    if constraints:
+        values = constrain(found, values, edits, constraints)
     after = standing(template, before, edited(before, values), keep)
     deadline.check()
     vertices, linear = _carried(found, after, options.mode)
@@ -58,22 +66,26 @@ def move(
         found,
         [Shift(*row) for row in rows],
         [Shift(STATURE, *statures, found.unit)],
+        [Measured(STATURE, *statures, found.unit, _asked(found, edits, constraints))],
         found.mesh.vertices + shift,
         turn.maps_to_own(linear),
         _warnings(found.parameters, values),
     )
 
 
-def _values(found: BodyInference, edits: Mapping[str, Change]) -> Array:
-    """``[75]`` parameters after the changes; the stature comes last."""
+def _require_known(found: BodyInference, named: tuple[str, ...]) -> None:
     known = (*NAMES, STATURE)
-    unknown = [name for name in edits if name not in known]
+    unknown = [name for name in named if name not in known]
     if unknown:
         raise InvalidRequest(
             "unknown_parameter",
             f"{found.model.name} has no parameter {unknown[0][:80]!r}",
             f"Known are {', '.join(known)}.",
         )
+
+
+def _values(found: BodyInference, edits: Mapping[str, Change]) -> Array:
+    """``[75]`` parameters after the changes; the stature comes last."""
     values = found.parameters.copy()
     for index, name in enumerate(NAMES):
         if name in edits:
@@ -118,6 +130,16 @@ def of_stature(template: SkinnedTemplate, shape: Array, metres: float) -> Array:
     if abs(stature(template, shape) - metres) <= 1e-6 * metres:
         return shape
     raise _fixed(f"{TALLER} does not lead to that height", "Choose one nearer to the present one.")
+
+
+def _asked(
+    found: BodyInference, edits: Mapping[str, Change], constraints: Mapping[str, Interval]
+) -> Interval | None:
+    """Where the stature was to lie."""
+    if STATURE in constraints or STATURE not in edits:
+        return constraints.get(STATURE)
+    target = edits[STATURE].apply(found.stature(found.fit.body))
+    return Interval(target, target)
 
 
 def _fixed(fault: str, suggestion: str) -> InvalidRequest:

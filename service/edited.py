@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.constraints import Interval
 from service.deform.flips import count_flips
 from service.inference import Inference
 from service.mesh.convert import convert
@@ -50,12 +51,29 @@ class Shift:
 
 
 @dataclass(frozen=True)
+class Measured:
+    """A dimension of the mesh itself before and after an edit, and where it was to lie, if so."""
+
+    name: str
+    before: float
+    after: float
+    unit: str
+    asked: Interval | None = None
+
+    def report(self) -> dict[str, Any]:
+        """The same as JSON."""
+        values = {"before": self.before, "after": self.after, "unit": self.unit}
+        return values if self.asked is None else {**values, "asked": self.asked.asked}
+
+
+@dataclass(frozen=True)
 class Moved:
     """Where an edit takes an upload.
 
     Attributes:
         found: the upload and its parameters before.
         parameters, derived: what they were and are.
+        dimensions: what the mesh itself measured and measures.
         vertices: ``[V, 3]`` new positions in the file's own frame.
         linear: ``[V, 3, 3]`` local linear maps, likewise.
         warnings: what the client should know of the edit.
@@ -64,6 +82,7 @@ class Moved:
     found: Inference
     parameters: Sequence[Shift]
     derived: Sequence[Shift]
+    dimensions: Sequence[Measured]
     vertices: Array
     linear: NDArray[np.floating]
     warnings: Sequence[str]
@@ -95,6 +114,7 @@ def _report(moved: Moved) -> dict[str, Any]:
         "model": found.model.identity,
         "parameters": _changes(moved.parameters),
         "derived": _changes(moved.derived),
+        "dimensions": {measured.name: measured.report() for measured in moved.dimensions},
         "vertices": {
             "total": len(mesh.vertices),
             "moved": int((moved.vertices != mesh.vertices).any(axis=1).sum()),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import math
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from service.errors import InvalidRequest
+from service.namedentries import number_fault, read_entries
 
 Kind = Literal["set", "add", "scale"]
 KINDS: tuple[Kind, ...] = ("set", "add", "scale")
@@ -34,14 +33,7 @@ def parse_edits(text: str) -> dict[str, Change]:
     Raises:
         InvalidRequest: when the text is not JSON, or not an object of names and changes.
     """
-    try:
-        entries = json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique)
-    except (ValueError, RecursionError) as error:
-        raise InvalidRequest("edits_not_json", f"edits can't be read: {error}", FORM) from error
-    if not isinstance(entries, dict):
-        fault = f"edits is a {_kind_of(entries)}, not an object"
-        raise InvalidRequest("edits_not_object", fault, FORM)
-    return {name: _change(name, entry) for name, entry in entries.items()}
+    return {name: _change(name, entry) for name, entry in read_entries(text, "edits", FORM).items()}
 
 
 def _change(name: str, entry: Any) -> Change:
@@ -52,28 +44,10 @@ def _change(name: str, entry: Any) -> Change:
         kind, amount = next(iter(entry.items()))
     else:
         kind, amount = "set", entry
-    if isinstance(amount, bool) or not isinstance(amount, int | float):
-        raise _malformed(name, f"is a {_kind_of(amount)}, not a number")
-    if not abs(amount) < 1e12 or not math.isfinite(amount):
-        raise _malformed(name, "is not a finite number of sensible size")
+    if (fault := number_fault(amount)) is not None:
+        raise _malformed(name, fault)
     return Change(cast(Kind, kind), float(amount))
 
 
 def _malformed(name: str, fault: str) -> InvalidRequest:
     return InvalidRequest("edit_malformed", f"the change of {name[:80]!r} {fault}", FORM)
-
-
-def _refuse(constant: str) -> float:
-    raise ValueError(f"{constant} is not a number in JSON")
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    entries = dict(pairs)
-    if len(entries) != len(pairs):
-        raise ValueError("a name stands twice in one object")
-    return entries
-
-
-def _kind_of(value: Any) -> str:
-    names = {dict: "object", list: "list", str: "text", bool: "truth value", type(None): "null"}
-    return names.get(type(value), "number")

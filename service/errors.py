@@ -11,20 +11,27 @@
     `- ModelFault           an installed model that can't be trusted
 
 Each error carries a stable `code` (snake_case, part of the API), a `detail` that names what was
-found, and a `suggestion` that says what to do.  `service.api.problems` maps classes to statuses.
+found, and a `suggestion` that says what to do; some carry further `members` for programs.
+`service.api.problems` maps classes to statuses.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 
 class ShapeError(Exception):
     """Base of every error that a client can be told about."""
 
-    def __init__(self, code: str, detail: str, suggestion: str) -> None:
+    def __init__(
+        self, code: str, detail: str, suggestion: str, members: Mapping[str, Any] | None = None
+    ) -> None:
         super().__init__(f"{code}: {detail}")
         self.code = code
         self.detail = detail
         self.suggestion = suggestion
+        self.members = members or {}
 
 
 class UnsupportedFormat(ShapeError):

@@ -18,6 +18,7 @@ from service.api.mesh_response import mesh_response
 from service.api.problems import documented
 from service.api.schemas import MESH_CONTENT, MESH_HEADERS, EditReport
 from service.api.store import MeshStore
+from service.constraints import NONE, parse_constraints
 from service.edited import Edited
 from service.edits import parse_edits
 from service.encode.model import Model
@@ -36,6 +37,13 @@ router = APIRouter(tags=["shapes"])
     "file's own bytes.\n\n"
     '    curl -F mesh=@chair.glb -F \'edits={"seat_width": {"scale": 1.2}}\' \\\n'
     "         http://127.0.0.1:8000/edit -OJ\n\n"
+    "With `constraints` the parameters change by as little as keeps to them, beside the edits or "
+    "without any:\n\n"
+    "    curl -F mesh=@chair.glb -F \\\n"
+    '         \'constraints={"seat_top_height": 0.45, "total_width": {"max": 0.6}}\' \\\n'
+    "         http://127.0.0.1:8000/edit -OJ\n\n"
+    "Where they contradict each other the answer is a 422 with the code `constraints_conflict`, "
+    "whose member `conflicts` names what comes nearest.\n\n"
     "With `Accept: application/json` it answers a report instead, and keeps the edited mesh for "
     "`GET /meshes/{mesh_id}`.",
     dependencies=[Depends(form_content_type)],
@@ -74,8 +82,10 @@ def _edit(
     models: Mapping[str, Model],
     store: MeshStore,
 ) -> Response:
-    edits = parse_edits(form.edits)
-    edited = pipeline.edit(upload, models, form.infer_options(), edits, form.edit_options())
+    edits = parse_edits(form.edits) if form.edits is not None else {}
+    constraints = parse_constraints(form.constraints) if form.constraints is not None else NONE
+    options = form.infer_options(), edits, form.edit_options()
+    edited = pipeline.edit(upload, models, *options, constraints)
     result = Upload(edited.data, edited_name(upload.name, edited.format), edited.media_type)
     accept = ",".join(request.headers.getlist("accept"))
     if negotiate(accept, [edited.media_type, JSON]) == JSON:

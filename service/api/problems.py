@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
@@ -63,7 +64,10 @@ _WHAT: dict[int, str] = {
 
 
 class Problem(JSONResponse):
-    """A problem document; `title` is the status's phrase, as goes with `about:blank`."""
+    """A problem document; `title` is the status's phrase, as goes with `about:blank`.
+
+    RFC 9457 calls ``members`` beyond its own extensions; `ProblemDocument` lists them.
+    """
 
     media_type = MEDIA_TYPE
 
@@ -75,6 +79,7 @@ class Problem(JSONResponse):
         suggestion: str,
         trace_id: str,
         headers: dict[str, str] | None = None,
+        members: Mapping[str, Any] | None = None,
     ) -> None:
         document = {
             "type": "about:blank",
@@ -84,6 +89,7 @@ class Problem(JSONResponse):
             "code": code,
             "suggestion": suggestion,
             "trace_id": trace_id,
+            **(members or {}),
         }
         super().__init__(document, status_code=status, headers=headers)
 
@@ -104,7 +110,13 @@ async def _shape_error(request: Request, error: Exception) -> Problem:
     status = next(STATUSES[kind] for kind in type(error).__mro__ if kind in STATUSES)
     headers = {"Retry-After": RETRY_AFTER[error.code]} if error.code in RETRY_AFTER else None
     return Problem(
-        status, error.code, error.detail, error.suggestion, request.state.trace_id, headers
+        status,
+        error.code,
+        error.detail,
+        error.suggestion,
+        request.state.trace_id,
+        headers,
+        error.members,
     )
 
 

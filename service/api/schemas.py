@@ -134,6 +134,22 @@ class Change(Schema):
     unit: Unit
 
 
+class Asked(Schema):
+    """Where a value was to lie."""
+
+    set: float | None = None
+    min: float | None = None
+    max: float | None = None
+
+
+class Dimension(Change):
+    """A dimension before and after an edit, as the mesh itself measures it; a body's stature is
+    that of the fitted body, standing straight."""
+
+    asked: Asked | None = None
+    """What edits or constraints wanted of it, where they name it."""
+
+
 class VertexCount(Schema):
     """How much of the mesh moved."""
 
@@ -154,6 +170,11 @@ class EditReport(Schema):
         examples=[{"seat_width": {"before": 0.48, "after": 0.576, "unit": "m"}}]
     )
     derived: dict[str, Change]
+    dimensions: dict[str, Dimension] = Field(
+        examples=[
+            {"total_width": {"before": 0.7, "after": 0.6, "unit": "m", "asked": {"max": 0.6}}}
+        ]
+    )
     vertices: VertexCount
     flipped_faces: int
     """Faces that the edit turned over."""
@@ -221,6 +242,18 @@ class Ready(Schema):
     """Models of the operator's own that are not served, or not as they now lie in the folder."""
 
 
+class Conflict(Schema):
+    """A constraint that can't be met with the others."""
+
+    name: str
+    asked: Asked
+    nearest: float
+    """The value that can be had when each of the conflicts takes its nearest."""
+    by: float
+    """How far that is from what was asked for."""
+    unit: Unit
+
+
 class ProblemDocument(Schema):
     """Every error (RFC 9457)."""
 
@@ -235,3 +268,6 @@ class ProblemDocument(Schema):
     """What to do about it."""
     trace_id: str
     """Also in the header `Trace-Id`; taken from the request's `traceparent` when it has one."""
+    conflicts: list[Conflict] | None = None
+    """Of `constraints_conflict`: which constraints contradict each other, and how far each would
+    have to give way, in shares of its value as little as can be."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
+from service.deform.leastdistance import least_distance
 from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ class Bounds:
         found = asked.copy()
         # Twice: what is lost to rounding in a step from far away is made good in one from near.
         for _ in range(2):
-            found[free] += weights * _least_distance(
+            found[free] += weights * least_distance(
                 self.rows[:, free] * weights, -(self.rows @ found + self.constants)
             )
         return found
@@ -94,25 +94,6 @@ class Bounds:
         rounding = 1e-9 * (np.abs(terms).sum(axis=1) + np.abs(self.constants))
         kept: Array = np.where(np.abs(gaps) <= rounding, 0.0, gaps)
         return kept
-
-
-def _least_distance(rows: Array, least: Array) -> Array:
-    """The shortest ``z`` with ``rows @ z >= least``, which some ``z`` fulfils.
-
-    Lawson and Hanson's least distance programming: the dual is a non-negative least squares fit.
-    """
-    size = np.linalg.norm(rows, axis=1)
-    reached = size > 0.0
-    rows, least = rows[reached] / size[reached, None], least[reached] / size[reached]
-    largest = least.max(initial=0.0)
-    if largest <= 0.0:
-        return np.zeros(rows.shape[1])
-    stacked = np.vstack([rows.T, least / largest])
-    target = np.zeros(len(stacked))
-    target[-1] = 1.0
-    residual = stacked @ nnls(stacked, target)[0] - target
-    shortest: Array = -largest * residual[:-1] / residual[-1]
-    return shortest
 
 
 def unusual(template: AffineTemplate, before: Array, after: Array) -> list[str]:

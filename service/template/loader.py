@@ -167,7 +167,23 @@ def _derived(name: str, entry: Mapping[str, Any], names: Sequence[str]) -> Deriv
         row=parse_affine(entry["value"], names) if "value" in entry else None,
         extent=entry.get("extent"),
         by=tuple(names.index(parameter) for parameter in entry["by"]),
+        on=_measured_on(name, entry),
     )
+
+
+def _measured_on(name: str, entry: Mapping[str, Any]) -> str | None:
+    """The part whose upper face says how a row is measured on the mesh itself."""
+    measure = entry.get("measure")
+    if measure is None:
+        return None
+    if "value" not in entry:
+        raise TemplateError(f"derived {name!r}: an extent is measured as it is; leave out measure")
+    ways = {key: measure[key] for key in measure if key != "part"}
+    if ways != {"face": "+y", "from": "floor"}:
+        raise TemplateError(
+            f"derived {name!r}: measure is {{part: ..., face: +y, from: floor}}, no other way"
+        )
+    return str(measure["part"])
 
 
 def _interval(pair: Sequence[float]) -> tuple[float, float]:

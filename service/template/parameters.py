@@ -51,6 +51,8 @@ class Derived:
         row: ``[1 + d]`` affine row that gives it, or None when it is an extent.
         extent: the axis along which it is measured on the mesh itself, or None.
         by: indices of the parameters that setting it changes, in proportion to their values.
+        on: the part on whose upper face the mesh itself is measured, from the mesh's lowest point
+            up, to verify what the row says; None where the row alone tells.
     """
 
     name: str
@@ -60,3 +62,4 @@ class Derived:
     row: NDArray[np.float64] | None
     extent: Axis | None
     by: tuple[int, ...]
+    on: str | None = None

@@ -56,10 +56,18 @@ class PretendPipeline:
         self.work()
         return SimpleNamespace(report=lambda: {"mesh_id": upload.mesh_id, "category": "stool"})
 
-    def edit(self, upload: Upload, models: Any, options: Any, edits: Any, edit_options: Any) -> Any:
+    def edit(
+        self,
+        upload: Upload,
+        models: Any,
+        options: Any,
+        edits: Any,
+        edit_options: Any,
+        constraints: Any = None,
+    ) -> Any:
         self.calls.append({
             "upload": upload, "models": models, "options": options, "edits": edits,
-            "edit_options": edit_options,
+            "edit_options": edit_options, "constraints": constraints,
         })  # fmt: skip
         self.work()
         return SimpleNamespace(
@@ -72,6 +80,7 @@ class PretendPipeline:
                 "model": IDENTITY,
                 "parameters": {"seat_width": {"before": 0.1, "after": 0.12, "unit": "m"}},
                 "derived": {},
+                "dimensions": {},
                 "vertices": {"total": 3, "moved": 2},
                 "flipped_faces": 0,
                 "warnings": ["a warning"],

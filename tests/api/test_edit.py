@@ -292,3 +292,89 @@ def test_an_edit_too_far_is_the_nearest_or_when_strict_refused(
     document = problem(send(strict="true"), 422, "edit_out_of_bounds")
     assert "0.8 * seat_width - 2 * leg_width - 2 * leg_inset >= 0" in document.detail
     assert f"{near['leg_width']:.4g}" in document.suggestion
+
+
+def constrain(
+    client: httpx.Client, chair_glb: bytes, constraints: str, accept: str = "*/*", **fields: str
+) -> httpx.Response:
+    return client.post(
+        "/edit",
+        files={"mesh": ("chair.glb", chair_glb)},
+        data={"constraints": constraints, **fields},
+        headers={"accept": accept},
+    )
+
+
+def test_constraints_are_kept_by_the_mesh(service_client: httpx.Client, chair_glb: bytes) -> None:
+    wishes = '{"total_height": {"max": 0.8}, "total_width": {"min": 0.5}, "seat_top_height": 0.43}'
+    response = constrain(service_client, chair_glb, wishes)
+    assert response.status_code == 200, response.text
+    extents = load(response.content).extents
+    assert extents[1] == pytest.approx(0.8, abs=2e-6)
+    assert extents[0] == pytest.approx(0.5, abs=2e-6)
+    values = json.loads(response.headers["shape-parameters"])
+    assert values["seat_top_height"] == pytest.approx(0.43)
+    # By the parameters it is as far off as the fit is.
+    assert values["leg_height"] + values["seat_thickness"] == pytest.approx(0.43, rel=0.01)
+    report = EditReport.model_validate_json(
+        constrain(service_client, chair_glb, wishes, "application/json").content, extra="forbid"
+    )
+    height = report.dimensions["total_height"]
+    assert (height.before, height.after) == (pytest.approx(0.88), pytest.approx(0.8))
+    assert height.asked is not None
+    assert height.asked.max == 0.8
+    seat = report.dimensions["seat_top_height"]
+    assert (seat.before, seat.after) == (pytest.approx(0.46), pytest.approx(0.43))
+    assert report.dimensions["total_depth"].asked is None
+
+
+def test_constraints_that_the_mesh_keeps_change_no_byte(
+    service_client: httpx.Client, chair_glb: bytes
+) -> None:
+    for wishes in ("{}", '{"total_width": {"max": 0.6}, "leg_height": {"min": 0.3}}'):
+        assert constrain(service_client, chair_glb, wishes).content == chair_glb
+    both = constrain(service_client, chair_glb, "{}", edits='{"seat_width": 0.5}')
+    alone = service_client.post(
+        "/edit", files={"mesh": ("chair.glb", chair_glb)}, data={"edits": '{"seat_width": 0.5}'}
+    )
+    assert both.content == alone.content
+
+
+def test_constraints_that_conflict_are_told_with_what_comes_nearest(
+    service_client: httpx.Client, problem: Any, chair_glb: bytes
+) -> None:
+    response = constrain(
+        service_client, chair_glb, '{"total_width": {"max": 0.4}}', edits='{"seat_width": 0.5}'
+    )
+    document = problem(response, 422, "constraints_conflict")
+    assert "the edit of seat_width stays" in document.detail
+    (conflict,) = response.json()["conflicts"]
+    assert (conflict["name"], conflict["asked"], conflict["unit"]) == (
+        "total_width", {"max": 0.4}, "m"
+    )  # fmt: skip
+    assert conflict["nearest"] - conflict["by"] == pytest.approx(0.4)
+    again = constrain(
+        service_client,
+        chair_glb,
+        json.dumps({"total_width": {"max": conflict["nearest"]}}),
+        edits='{"seat_width": 0.5}',
+    )
+    assert again.status_code == 200, again.text
+
+
+@pytest.mark.parametrize(
+    ("wishes", "code"),
+    [
+        ("not json", "constraints_not_json"),
+        ("[1]", "constraints_not_object"),
+        ('{"seat_width": {"add": 1}}', "constraint_malformed"),
+        ('{"seat_with": {"max": 1}}', "unknown_parameter"),
+        ('{"seat_taper": {"max": 1}}', "unknown_parameter"),
+        ('{"seat_width": {"max": 0}}', "constraints_conflict"),
+        ('{"seat_width": {"min": 2, "max": 1}}', "constraints_conflict"),
+    ],
+)
+def test_constraints_that_make_no_sense(
+    service_client: httpx.Client, problem: Any, chair_glb: bytes, wishes: str, code: str
+) -> None:
+    problem(constrain(service_client, chair_glb, wishes), 422, code)

@@ -6,6 +6,7 @@ from typing import Any
 import httpx
 import pytest
 
+from service.constraints import Interval
 from service.requests import EditOptions, InferOptions
 
 MESH = ("chair.obj", b"abc", "model/obj")
@@ -23,6 +24,7 @@ def test_the_options_reach_the_pipeline(client: httpx.Client, pretend: Any) -> N
     data = {
         "category": "stool", "up": "+z", "front": "-y", "units": "mm", "refine": "false",
         "edits": "{}", "mode": "paper", "keep": "seat", "format": "stl", "strict": "true",
+        "constraints": '{"seat_width": {"max": 0.5}}',
     }  # fmt: skip
     assert client.post("/edit", files={"mesh": MESH}, data=data).status_code == 200
     call = pretend.calls[0]
@@ -30,6 +32,18 @@ def test_the_options_reach_the_pipeline(client: httpx.Client, pretend: Any) -> N
         category="stool", up="+z", front="-y", units="mm", refine=False
     )
     assert call["edit_options"] == EditOptions(mode="paper", keep="seat", format="stl", strict=True)
+    assert call["constraints"] == {"seat_width": Interval(high=0.5)}
+
+
+def test_edits_or_constraints_are_enough_and_one_is_needed(
+    client: httpx.Client, pretend: Any, problem: Any
+) -> None:
+    for name in ("edits", "constraints"):
+        response = client.post("/edit", files={"mesh": MESH}, data={name: "{}"})
+        assert response.status_code == 200
+        assert (pretend.calls[-1]["edits"], dict(pretend.calls[-1]["constraints"])) == ({}, {})
+    document = problem(client.post("/edit", files={"mesh": MESH}), 422, "field_missing")
+    assert "'edits'" in document.detail
 
 
 @pytest.mark.parametrize(

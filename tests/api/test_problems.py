@@ -39,6 +39,21 @@ def test_each_error_has_its_status(
     assert (document.type, document.title) == ("about:blank", title)
 
 
+def test_members_of_an_error_are_members_of_the_document(
+    client: httpx.Client, pretend: Any, problem: Any
+) -> None:
+    conflict = {"name": "a", "asked": {"max": 1.0}, "nearest": 2.0, "by": 1.0, "unit": "m"}
+
+    def fail() -> None:
+        raise errors.InvalidRequest("some_code", "found", "to do", {"conflicts": [conflict]})
+
+    pretend.work = fail
+    response = client.post("/infer", files={"mesh": ("a.obj", b"abc")})
+    document = problem(response, 422, "some_code")
+    assert response.json()["conflicts"] == [conflict]
+    assert document.conflicts[0].asked.max == 1.0
+
+
 def test_every_error_class_has_a_status() -> None:
     assert set(errors.ShapeError.__subclasses__()) == {kind for kind, _, _ in CASES}
 

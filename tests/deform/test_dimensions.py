@@ -7,7 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from service.constraints import Interval
+from service.deform.demands import Unsatisfiable
 from service.deform.dimensions import Dimensions
+from service.deform.measured import Level
+from service.deform.outcome import Outcome
 from service.edits import Change, Kind
 from service.errors import InvalidRequest
 from service.template.loader import load_template
@@ -265,3 +269,142 @@ def test_dimensions_by_extent_only_need_no_row() -> None:
         replace(CHAIR, derived=derived), F, CHAIR.decode(F), jacobian=CHAIR.jacobian
     )
     np.testing.assert_allclose(list(dimensions.derived(F).values()), 0.82)
+
+
+def cushioned() -> Dimensions:
+    """A chair whose seat lies 3 cm above where its parameters say."""
+    vertices, jacobian = CHAIR.decode(F), CHAIR.jacobian
+    top = vertices[(CHAIR.part == 0), 1].max()
+    seat = np.flatnonzero((CHAIR.part == 0) & (vertices[:, 1] == top))
+    vertices[seat, 1] += 0.03
+    level = Level(seat, np.full(len(seat), 1 / len(seat)))
+    return Dimensions(CHAIR, F, vertices, 1.0, jacobian, {"seat_top_height": level})
+
+
+def on_the_mesh(dimensions: Dimensions, outcome: Outcome, name: str) -> float:
+    return dimensions.measured(outcome.change)[name][1]
+
+
+def test_what_is_asked_of_the_mesh_is_had_on_the_mesh_and_told() -> None:
+    dimensions = cushioned()
+    outcome = dimensions.outcome({"seat_top_height": Change("set", 0.5)}, strict=True)
+    assert on_the_mesh(dimensions, outcome, "seat_top_height") == pytest.approx(0.5)
+    assert outcome.derived["seat_top_height"] == pytest.approx(0.5)
+    values = named(outcome.parameters)
+    assert values == pytest.approx(VALUES | {"leg_height": 0.44})
+    moved = named(F + outcome.change)
+    assert moved == pytest.approx(VALUES | {"leg_height": 0.41})
+
+
+def test_relative_changes_are_relative_for_the_mesh_and_for_what_is_told() -> None:
+    dimensions = cushioned()
+    for change, told, mesh in (
+        (Change("add", 0.1), 0.52, 0.55),
+        (Change("scale", 1.1), 0.462, 0.495),
+        (Change("set", 0.42), 0.42, 0.45),
+    ):
+        outcome = dimensions.outcome({"seat_top_height": change}, strict=True)
+        assert outcome.derived["seat_top_height"] == pytest.approx(told)
+        assert on_the_mesh(dimensions, outcome, "seat_top_height") == pytest.approx(mesh)
+    same = dimensions.outcome({"seat_top_height": Change("set", 0.42)})
+    np.testing.assert_array_equal(same.parameters, F)
+    np.testing.assert_array_equal(same.change, 0.0)
+
+
+def test_a_constraint_is_of_the_mesh_too() -> None:
+    dimensions = cushioned()
+    lower = dimensions.outcome({}, constraints={"seat_top_height": Interval(high=0.44)})
+    assert on_the_mesh(dimensions, lower, "seat_top_height") == pytest.approx(0.44)
+    assert lower.derived["seat_top_height"] == pytest.approx(0.44)
+    # The mesh keeps this one already, and it is told as the mesh has it.
+    kept = dimensions.outcome({}, constraints={"seat_top_height": Interval(low=0.44)})
+    np.testing.assert_array_equal(kept.change, 0.0)
+    assert kept.derived["seat_top_height"] == pytest.approx(0.45)
+
+
+def test_a_constraint_on_what_one_parameter_is_behind_is_the_edit() -> None:
+    for name in ("total_width", "total_depth"):
+        value = with_wings().derived(F)[name] * 1.2
+        edited = with_wings().outcome({name: Change("set", value)})
+        for interval in (Interval(value, value), Interval(low=value)):
+            kept = with_wings().outcome({}, constraints={name: interval})
+            np.testing.assert_allclose(kept.parameters, edited.parameters, rtol=1e-6)
+        assert kept.asked == {name: Interval(low=value)}
+
+
+def test_of_several_parameters_each_changes_by_the_square_of_its_size() -> None:
+    outcome = box_chair().outcome({}, constraints={"total_height": Interval(high=0.75)})
+    sizes = {name: VALUES[name] ** 2 for name in ("back_height", "leg_height", "seat_thickness")}
+    shares = {name: -0.07 * size / sum(sizes.values()) for name, size in sizes.items()}
+    expected = VALUES | {name: VALUES[name] + share for name, share in shares.items()}
+    assert named(outcome.parameters) == pytest.approx(expected)
+    assert outcome.derived["total_height"] == pytest.approx(0.75)
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.dictionaries(
+        st.sampled_from([*CHAIR.names, *CHAIR.derived]),
+        st.tuples(st.floats(0.8, 1.25), st.sampled_from(["set", "min", "max"])),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_constraints_are_met_or_their_nearest_can_be(wishes: dict[str, tuple[float, str]]) -> None:
+    dimensions = with_wings()
+    now = VALUES | dimensions.derived(F)
+    constraints = {
+        name: {
+            "set": Interval(now[name] * factor, now[name] * factor),
+            "min": Interval(low=now[name] * factor),
+            "max": Interval(high=now[name] * factor),
+        }[kind]
+        for name, (factor, kind) in wishes.items()
+    }
+    try:
+        outcome = dimensions.outcome({}, constraints=constraints)
+    except Unsatisfiable as conflict:
+        for one in conflict.conflicts:
+            ends = constraints[one.name]
+            low, high = min(ends.low, one.nearest), max(ends.high, one.nearest)
+            constraints[one.name] = Interval(low, high)
+        outcome = dimensions.outcome({}, constraints=constraints)
+    after = named(outcome.parameters) | outcome.derived
+    for name, ends in constraints.items():
+        assert ends.low * (1 - 1e-8) <= after[name] <= ends.high * (1 + 1e-8)
+    assert (outcome.parameters >= 1e-3 - 1e-9).all()
+    assert (CHAIR.relations @ [1.0, *outcome.parameters] > -1e-9).all()
+
+
+def test_edits_come_first_and_stay() -> None:
+    edits = {"leg_height": Change("set", 0.45), "total_width": Change("scale", 1.1)}
+    outcome = box_chair().outcome(edits, constraints={"total_height": Interval(0.85, 0.85)})
+    after = named(outcome.parameters) | outcome.derived
+    assert after["leg_height"] == 0.45
+    assert after["total_width"] == pytest.approx(0.528)
+    assert after["total_height"] == pytest.approx(0.85)
+    assert outcome.adjusted == {}
+
+
+def test_what_conflicts_with_an_edit_or_a_limit_says_so() -> None:
+    edits = {"seat_width": Change("set", 0.5)}
+    with pytest.raises(Unsatisfiable) as caught:
+        box_chair().outcome(edits, constraints={"total_width": Interval(high=0.4)})
+    assert list(caught.value.held) == ["seat_width"]
+    (conflict,) = caught.value.conflicts
+    assert (conflict.name, conflict.nearest) == ("total_width", pytest.approx(0.5, rel=1e-5))
+    with pytest.raises(Unsatisfiable) as caught:
+        box_chair().outcome({}, constraints={"leg_width": Interval(high=-1.0)})
+    assert list(caught.value.limits) == ["leg_width > 0"]
+    with pytest.raises(Unsatisfiable) as caught:
+        box_chair().outcome(
+            {}, constraints={"leg_width": Interval(low=0.3), "seat_width": Interval(high=0.5)}
+        )
+    assert list(caught.value.limits) == ["0.8 * seat_width - 2 * leg_width >= 0"]
+    assert [c.name for c in caught.value.conflicts] == ["leg_width", "seat_width"]
+
+
+def test_an_unknown_name_in_a_constraint_is_refused() -> None:
+    with pytest.raises(InvalidRequest) as caught:
+        box_chair().outcome({}, constraints={"seat_height": Interval(high=1.0)})
+    assert caught.value.code == "unknown_parameter"

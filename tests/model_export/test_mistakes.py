@@ -51,6 +51,11 @@ def test_parameters_that_move_the_same_thing(spec: Any) -> None:
     assert mistake.error
 
 
+def test_a_dimension_that_is_measured_on_no_part(spec: Any) -> None:
+    spec["derived"]["top_height"]["measure"]["part"] = "lid"
+    assert "no part is named 'lid'" in told(found(spec), "derived top_height").text
+
+
 def test_a_part_that_turns_inside_out(spec: Any) -> None:
     spec["parts"]["top"]["size"][0] = "top_width - 2 * leg_height"
     mistake = told(found(spec), "parts top")

@@ -201,11 +201,26 @@ def test_a_nuisance_parameter_follows_a_public_one_only(follows: str) -> None:
         ("parts.leg.along", "w", "part 'leg': along 'w' is no axis"),
         ("parts.leg.center", [0, 0], "an entry has the wrong form"),
         ("derived.total.by", ["depth"], "an entry has the wrong form"),
+        ("derived.total.measure", {"part": "top", "face": "+x", "from": "floor"}, "no other way"),
+        ("derived.total.measure", {"face": "+y", "from": "floor"}, "the entry 'part' is missing"),
+        ("derived.total.measure", "top", "an entry has the wrong form"),
+        (
+            "derived.length.measure",
+            {"part": "top", "face": "+y", "from": "floor"},
+            "an extent is measured as it is",
+        ),
     ],
 )
 def test_a_bad_entry_is_refused_by_name(path: str, value: Any, message: str) -> None:
     with pytest.raises(TemplateError, match=message):
         compile_template(changed(path, value))
+
+
+def test_a_row_may_say_where_it_is_measured() -> None:
+    measure = {"part": "top", "face": "+y", "from": "floor"}
+    derived = compile_template(changed("derived.total.measure", measure)).derived
+    assert derived["total"].on == "top"
+    assert derived["length"].on is None
 
 
 def test_a_template_that_does_not_exist_is_refused(tmp_path: Path) -> None:

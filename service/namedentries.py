@@ -1,0 +1,57 @@
+"""JSON objects of names and entries in form fields: `edits`, `constraints`."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from service.errors import InvalidRequest
+
+
+def read_entries(text: str, field: str, form: str) -> dict[str, Any]:
+    """A field's entries by name.
+
+    Args:
+        text: of the field.
+        field: its name, for the errors: ``<field>_not_json`` and ``<field>_not_object``.
+        form: the suggestion, what to write instead.
+
+    Raises:
+        InvalidRequest: when the text is not JSON, or not an object.
+    """
+    try:
+        entries = json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique)
+    except (ValueError, RecursionError) as error:
+        raise InvalidRequest(
+            f"{field}_not_json", f"{field} can't be read: {error}", form
+        ) from error
+    if not isinstance(entries, dict):
+        fault = f"{field} is a {_kind_of(entries)}, not an object"
+        raise InvalidRequest(f"{field}_not_object", fault, form)
+    return entries
+
+
+def number_fault(value: Any) -> str | None:
+    """What keeps an entry's value from being a number of sensible size; None if nothing does."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f"is a {_kind_of(value)}, not a number"
+    if not abs(value) < 1e12 or not math.isfinite(value):
+        return "is not a finite number of sensible size"
+    return None
+
+
+def _refuse(constant: str) -> float:
+    raise ValueError(f"{constant} is not a number in JSON")
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entries = dict(pairs)
+    if len(entries) != len(pairs):
+        raise ValueError("a name stands twice in one object")
+    return entries
+
+
+def _kind_of(value: Any) -> str:
+    names = {dict: "object", list: "list", str: "text", bool: "truth value", type(None): "null"}
+    return names.get(type(value), "number")
