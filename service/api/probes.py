@@ -1,9 +1,9 @@
-"""GET /livez and /readyz: what an orchestrator asks; GET /: the way in."""
+"""GET /livez and /readyz: what an orchestrator asks."""
 
 from __future__ import annotations
 
 from fastapi import APIRouter
-from starlette.responses import JSONResponse, RedirectResponse
+from starlette.responses import JSONResponse
 
 from service.api.context import Shared
 from service.api.problems import documented
@@ -46,8 +46,3 @@ async def readyz(shared: Shared) -> JSONResponse:
         for fault in installed.faults
     ]
     return JSONResponse({"status": "ready", "models": names, "faults": faults})
-
-
-@router.get("/", include_in_schema=False)
-async def root() -> RedirectResponse:
-    return RedirectResponse("docs")

@@ -63,9 +63,3 @@ def test_a_bad_model_keeps_it_from_being_ready(
     problem(client.post("/infer", files={"mesh": ("a.obj", b"abc")}), 503, "model_fault")
     assert "stool.json" in problem(client.get("/readyz"), 503, "model_fault").detail
     assert client.get("/livez").status_code == 200
-
-
-def test_the_root_leads_to_the_docs(client: httpx.Client) -> None:
-    response = client.get("/", follow_redirects=True)
-    assert response.url.path == "/docs"
-    assert "swagger" in response.text.lower()
