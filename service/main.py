@@ -11,7 +11,7 @@ import anyio
 from fastapi import FastAPI
 from threadpoolctl import threadpool_limits
 
-from service.api import categories, edit, infer, meshes, openapi, probes, problems
+from service.api import categories, edit, infer, meshes, openapi, probes, problems, sliders, viewer
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.hangup import can_listen, reload_on_hangup
@@ -47,7 +47,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)
     app.add_middleware(Trace)  # added last: outermost
     problems.install(app)
-    for noun in (infer, edit, categories, meshes, probes):
+    for noun in (infer, edit, sliders, categories, meshes, probes, viewer):
         app.include_router(noun.router)
     app.openapi = partial(openapi.document, app)  # type: ignore[method-assign]
     return app

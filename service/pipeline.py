@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from service import affineedit, bodyedit, deadline
+from service import affineedit, affinesliders, bodyedit, bodysliders, deadline
 from service.affineinference import AffineInference
 from service.bodyinference import BodyInference
+from service.constraints import NONE, Interval
 from service.edited import Edited, Moved, write_edited
 from service.edits import Change
 from service.encode.affinemodel import AffineModel
@@ -28,6 +29,7 @@ from service.requests import (
     UNITS,
     EditOptions,
     InferOptions,
+    SliderOptions,
     Upload,
     file_unit,
     require_units,
@@ -42,15 +44,21 @@ class _Kind:
     Attributes:
         inference: what is known of an upload of one.
         move: carries out an edit of it.
+        sliders: puts all edits of it into a GLB.
+        template: puts all edits of what was fitted into one.
     """
 
     inference: type[Inference]
-    move: Callable[[Any, Mapping[str, Change], EditOptions, str], Moved]
+    move: Callable[[Any, Mapping[str, Change], EditOptions, str, Mapping[str, Interval]], Moved]
+    sliders: Callable[[Any, SliderOptions, str], bytes]
+    template: Callable[[Any, SliderOptions, str], bytes]
 
 
 _KINDS = {
-    AffineModel.kind: _Kind(AffineInference, affineedit.move),
-    BodyModel.kind: _Kind(BodyInference, bodyedit.move),
+    AffineModel.kind: _Kind(
+        AffineInference, affineedit.move, affinesliders.sliders, affinesliders.template
+    ),
+    BodyModel.kind: _Kind(BodyInference, bodyedit.move, bodysliders.sliders, bodysliders.template),
 }
 
 
@@ -81,19 +89,57 @@ def edit(
     options: InferOptions,
     edits: Mapping[str, Change],
     edit_options: EditOptions,
+    constraints: Mapping[str, Interval] = NONE,
 ) -> Edited:
     """Edit an upload's parameters and move its vertices accordingly.
 
+    Constraints are kept by the least further change; what the edits name stays as they have it.
+
     Raises:
-        ShapeError: as `infer`, and for an edit that can't be made.
+        ShapeError: as `infer`, and for an edit that can't be made, or constraints that conflict.
     """
     _require_mode(edit_options.mode)
     found = infer(upload, models, options)
     _require_recognised(found, options.category)
     keep = _anchor(found.model, edit_options.keep)
     deadline.check()
-    moved = _KINDS[found.model.kind].move(found, edits, edit_options, keep)
+    moved = _KINDS[found.model.kind].move(found, edits, edit_options, keep, constraints)
     return write_edited(moved, edit_options.format)
+
+
+def sliders(
+    upload: Upload,
+    models: Mapping[str, Model],
+    options: InferOptions,
+    slider_options: SliderOptions,
+) -> bytes:
+    """An upload as a GLB that holds its editing: morph targets, and a skeleton for a body.
+
+    Raises:
+        ShapeError: as `infer`, and for options that make no sense.
+    """
+    found = infer(upload, models, options)
+    _require_recognised(found, options.category)
+    keep = _anchor(found.model, slider_options.keep)
+    deadline.check()
+    return _KINDS[found.model.kind].sliders(found, slider_options, keep)
+
+
+def template(
+    upload: Upload,
+    models: Mapping[str, Model],
+    options: InferOptions,
+    slider_options: SliderOptions,
+) -> bytes:
+    """What was fitted to an upload, as a GLB in its frame, with the same sliders.
+
+    Raises:
+        ShapeError: as `sliders`.
+    """
+    found = infer(upload, models, options)
+    keep = _anchor(found.model, slider_options.keep)
+    deadline.check()
+    return _KINDS[found.model.kind].template(found, slider_options, keep)
 
 
 def skeleton(upload: Upload, models: Mapping[str, Model], options: InferOptions) -> Skeleton:

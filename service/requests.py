@@ -54,6 +54,33 @@ class EditOptions:
     strict: bool = False
 
 
+JOINT_NAMES = ("smpl", "mixamo", "vrm")
+"""Whose names a body's joints get."""
+RESTS = ("upload", "t_pose")
+"""Poses that a body's mesh may be bound in."""
+
+
+@dataclass(frozen=True)
+class SliderOptions:
+    """What a mesh with sliders in it offers, and how.
+
+    Attributes:
+        parameters: their names; None for all.
+        keep: the point that stays in place; None for the category's first.
+        paired: two targets a parameter, for viewers that know no negative weights.
+        quantize: store displacements as 16-bit fractions.
+        joint_names: one of `JOINT_NAMES`, for bodies.
+        rest: one of `RESTS`, for bodies.
+    """
+
+    parameters: tuple[str, ...] | None = None
+    keep: str | None = None
+    paired: bool = False
+    quantize: bool = False
+    joint_names: str = "smpl"
+    rest: str = "upload"
+
+
 def require_units(units: str) -> None:
     """Raise `InvalidRequest` unless ``units`` is one of `UNITS`."""
     if units not in UNITS:

@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 
 from service.bodyinference import BodyInference
 from service.deform import skinbinding
+from service.deform.skinbinding import SkinBinding
 from service.template.anatomy import JOINTS, PARENTS
+from service.template.skinned import Body
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Skeleton:
-    """An upload's own vertices, bound to a skeleton in the pose that it was inferred to have.
+    """An upload's own vertices, bound to a skeleton in a pose of theirs.
 
     All is in the upload's own frame and coordinates.  A vertex goes to
     ``sum(weight * world @ inverse_bind @ [vertex, 1])``, where a joint's ``world`` is its parent's
@@ -46,8 +48,21 @@ class Skeleton:
 
     @classmethod
     def of(cls, found: BodyInference) -> Skeleton:
-        """The skeleton of an inferred body."""
+        """The skeleton of an inferred body, in the pose that it was inferred to have."""
         template, body = found.model.template, found.fit.body
+        binding = skinbinding.bind(found.vertices, found.mesh.faces, template, body)
+        return cls.of_binding(found, binding, body)
+
+    @classmethod
+    def of_binding(cls, found: BodyInference, binding: SkinBinding, body: Body) -> Skeleton:
+        """The skeleton in another pose ``body``, for vertices that went there with it.
+
+        Args:
+            found: the inferred body.
+            binding: of its vertices.
+            body: the pose.
+        """
+        template = found.model.template
         frame = found.best.orientation.rotation.T
         joints = found.own_joints(body)
         binds = skinbinding.joint_matrices(template, body)
@@ -58,8 +73,7 @@ class Skeleton:
         inverses = np.asarray(np.linalg.inv(binds), dtype=np.float64)
         parents = np.concatenate([above.T[None], inverses[list(PARENTS[1:])]])
         nodes = parents @ binds
-        skin = skinbinding.bind(found.vertices, found.mesh.faces, template, body)
-        order = np.argsort(-skin.weights, axis=1, kind="stable")[:, : skinbinding.INFLUENCES]
+        order = np.argsort(-binding.weights, axis=1, kind="stable")[:, : skinbinding.INFLUENCES]
         return cls(
             names=JOINTS,
             parents=PARENTS,
@@ -69,5 +83,5 @@ class Skeleton:
             offsets=nodes[:, :3, 3],
             inverse_bind=inverses,
             indices=order,
-            weights=np.take_along_axis(skin.weights, order, axis=1),
+            weights=np.take_along_axis(binding.weights, order, axis=1),
         )

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import service
+from service.affineinference import AffineInference
+from service.deform.measured import find_levels
 from service.edits import Change
 from service.encode.model import Model, load_models
 from service.mesh.formats import read_mesh
@@ -54,6 +56,34 @@ def test_every_edit_of_a_real_chair_is_answered(models: dict[str, Model], path: 
             edited = edit(sent, models, UPRIGHT, change, EditOptions())
             assert np.isfinite(read_mesh(edited.data, path.name).vertices).all()
             assert edited.report["flipped_faces"] <= 0.05 * len(found.mesh.faces)
+
+
+@pytest.mark.parametrize("path", MESHES, ids=lambda path: path.stem)
+def test_a_seat_is_as_high_as_it_is_asked_to_be(models: dict[str, Model], path: Path) -> None:
+    sent = upload(path)
+    found = infer(sent, models, UPRIGHT)
+    assert isinstance(found, AffineInference)
+    fit, before = found.fit, found.report()["derived"]["seat_top_height"]["value"]
+    for factor in (0.9, 1.1):
+        asked = factor * before
+        change = {"seat_top_height": Change("set", asked)}
+        edited = edit(sent, models, UPRIGHT, change, EditOptions())
+        told = [text for text in edited.report["warnings"] if text.startswith("seat_top_height")]
+        if any("goes by the fit" in text or ", not " in text for text in told):
+            continue
+        assert edited.parameters["seat_top_height"] == pytest.approx(asked)
+        # Measured anew, on the file that came back.
+        turned = found.best.orientation.to_canonical(read_mesh(edited.data, path.name).vertices)
+        vertices = fit.normalization.apply(turned)
+        vertices[:, 1] += found.vertices[:, 1].min() - vertices[:, 1].min()
+        f = fit.parameters.copy()
+        leg = fit.template.names.index("leg_height")
+        raised = asked * found.scale - (f[leg] + f[fit.template.names.index("seat_thickness")])
+        shift = fit.translation + np.array([0.0, raised, 0.0])
+        level = find_levels(vertices, found.mesh.faces, fit.template, f, shift)["seat_top_height"]
+        height = float(level.of(vertices[:, 1])) - vertices[:, 1].min()
+        assert height / found.scale == pytest.approx(asked, rel=0.01)
+        assert edited.report["dimensions"]["seat_top_height"]["after"] == pytest.approx(asked)
 
 
 @pytest.mark.parametrize("path", POSTS, ids=lambda path: path.stem)

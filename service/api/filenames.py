@@ -11,9 +11,14 @@ LONGEST = 100
 
 def edited_name(name: str | None, suffix: str) -> str:
     """What an edited file is called: ``<stem>-edited.<suffix>``; the stem is cleaned."""
+    return derived_name(name, "edited", suffix)
+
+
+def derived_name(name: str | None, what: str, suffix: str) -> str:
+    """What a file made from another is called: ``<stem>-<what>.<suffix>``."""
     stem = PurePosixPath(clean(name)).stem if name else "mesh"
-    stem = stem.removesuffix("-edited") or "mesh"
-    return f"{stem}-edited.{suffix}"
+    stem = stem.removesuffix(f"-{what}") or "mesh"
+    return f"{stem}-{what}.{suffix}"
 
 
 def clean(name: str | None) -> str:

@@ -11,9 +11,10 @@ from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 from starlette.formparsers import MultiPartParser
 
+from service.api.names import parse_names
 from service.api.store import MeshStore
 from service.errors import InvalidRequest, UnsupportedFormat
-from service.requests import EditOptions, InferOptions, Upload
+from service.requests import EditOptions, InferOptions, SliderOptions, Upload
 
 # Uploads are bounded and are read into memory anyway: keep them off the disk, so that a container
 # with a read-only root needs no temporary folder.
@@ -84,14 +85,25 @@ class EditForm(InferForm):
     """A mesh, how to read it, and what to change."""
 
     edits: Annotated[
-        str,
+        Text,
         Field(
             description='A JSON object: a parameter or derived dimension to `{"set": value}`, '
-            '`{"add": value}`, `{"scale": factor}` or a bare number, which sets it.',
+            '`{"add": value}`, `{"scale": factor}` or a bare number, which sets it. May be left '
+            "out beside `constraints`.",
             examples=['{"seat_width": {"scale": 1.2}, "seat_top_height": 0.45}'],
             json_schema_extra={"contentMediaType": "application/json"},
         ),
-    ]
+    ] = None
+    constraints: Annotated[
+        Text,
+        Field(
+            description='A JSON object: a parameter or derived dimension to `{"min": value}`, '
+            '`{"max": value}`, both, or `{"set": value}` or a bare number. The parameters that '
+            "`edits` does not name change by as little as it takes, in proportion to their sizes.",
+            examples=['{"seat_top_height": 0.45, "total_width": {"max": 0.6}}'],
+            json_schema_extra={"contentMediaType": "application/json"},
+        ),
+    ] = None
     mode: Annotated[
         Literal["blend", "paper"],
         Field(description="How the mesh follows its template: blended transforms of the parts "
@@ -115,9 +127,65 @@ class EditForm(InferForm):
             "the category, with 422, instead of making the nearest one that does not."),
     ] = False  # fmt: skip
 
+    @model_validator(mode="before")
+    @classmethod
+    def _something_to_do(cls, fields: Any) -> Any:
+        """Without constraints a form lacks its edits; an unknown field may be a slip of either."""
+        if set(fields) <= set(cls.model_fields) - {"edits", "constraints"}:
+            missing = InitErrorDetails(type="missing", loc=("edits",), input=fields)
+            raise ValidationError.from_exception_data(cls.__name__, [missing])
+        return fields
+
     def edit_options(self) -> EditOptions:
         """The options as the pipeline takes them."""
         return EditOptions(self.mode, self.keep, self.format, self.strict)
+
+
+class SlidersForm(InferForm):
+    """A mesh, how to read it, and which sliders to put into it."""
+
+    parameters: Annotated[
+        Text,
+        Field(
+            description="The parameters to offer: names with commas between, or a JSON array; "
+            "by default all. `GET /categories/{name}` lists them.",
+            examples=["seat_width,leg_height"],
+        ),
+    ] = None
+    keep: Annotated[
+        Text,
+        Field(description="The point that stays in place; `GET /categories/{name}` lists them."),
+    ] = None
+    paired: Annotated[
+        bool,
+        Field(description="Two morph targets a parameter, `<name>+` and `<name>-`, for viewers "
+            "that clamp weights to 0..1; by default one, whose weight may be negative."),
+    ] = False  # fmt: skip
+    quantize: Annotated[
+        bool,
+        Field(description="Store displacements as 16-bit fractions (KHR_mesh_quantization) where "
+            "they are within 1 unit and the error within 0.002 % of the size."),
+    ] = False  # fmt: skip
+    joint_names: Annotated[
+        Literal["smpl", "mixamo", "vrm"],
+        Field(description="How the joints of a body are named and turned: SMPL's, Mixamo's, or "
+            "those of a VRM humanoid."),
+    ] = "smpl"  # fmt: skip
+    rest: Annotated[
+        Literal["upload", "t_pose"],
+        Field(description="The pose that a body's mesh is bound in: its own, or a T-pose."),
+    ] = "upload"
+
+    def slider_options(self) -> SliderOptions:
+        """The options as the pipeline takes them.
+
+        Raises:
+            InvalidRequest: when the names can't be read.
+        """
+        names = None if self.parameters is None else parse_names(self.parameters)
+        return SliderOptions(
+            names, self.keep, self.paired, self.quantize, self.joint_names, self.rest
+        )
 
 
 def form_content_type(request: Request) -> None:

@@ -1,0 +1,217 @@
+"""Sliders of rigid shapes: the columns of a bound mesh's Jacobian are its morph targets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service import deadline
+from service.affineedit import bind
+from service.affineinference import AffineInference
+from service.deform.admissible import LEAST, Bounds
+from service.deform.binding import Binding
+from service.deform.followers import following
+from service.deform.measured import find_levels
+from service.deform.unfold import unfold
+from service.mesh.convert import convert
+from service.mesh.embedding import as_glb
+from service.mesh.glb import GlbFile
+from service.mesh.stretch import Stretch
+from service.mesh.targets import Target, add_targets
+from service.requests import UNITS, SliderOptions, file_unit
+from service.sliders import Slider, chosen, notes, size_range, targets_of
+
+Array = NDArray[np.float64]
+Plane = tuple[float, Array]
+"""An affine function of the parameters: a constant, and a row ``[d]``."""
+
+SLIGHT = 5e-6
+"""Share of the mesh's size by which all targets together may leave out displacements."""
+
+
+def sliders(found: AffineInference, options: SliderOptions, keep: str) -> bytes:
+    """The mesh as a GLB with a morph target, or two, for each parameter.
+
+    Args:
+        found: the upload.
+        options: what to offer, and how.
+        keep: the point that stays in place.
+
+    Raises:
+        InvalidRequest: for an unknown parameter.
+    """
+    names, indices = _chosen(found, options)
+    binding = bind(found, "blend")
+    deadline.check()
+    binding = unfold(binding, found.vertices, found.mesh.faces, found.fit.parameters, indices)
+    deadline.check()
+    file = as_glb(found.mesh, file_unit(found.mesh.format, found.unit))
+    return _with_targets(found, file, binding, names, options, keep, _measured(found, binding))
+
+
+def template(found: AffineInference, options: SliderOptions, keep: str) -> bytes:
+    """The fitted template as a GLB in the upload's frame, with the same morph targets."""
+    names, _ = _chosen(found, options)
+    fit = found.fit
+    followed = following(fit.template, fit.parameters)
+    own = fit.normalization.invert(fit.template.decode(fit.parameters) + fit.translation)
+    vertices = found.best.orientation.to_own(own) * file_unit(found.mesh.format, found.unit)
+    file = GlbFile(convert(vertices, fit.template.faces, "glb"))
+    still = np.zeros((1, 9, len(followed.names)), np.float32)
+    none = np.zeros((len(vertices), 1), np.float32)
+    binding = Binding(followed.jacobian.astype(np.float32), none, still)
+    return _with_targets(found, file, binding, names, options, keep, {})
+
+
+def _chosen(found: AffineInference, options: SliderOptions) -> tuple[list[str], list[int]]:
+    """Names and indices of the parameters to offer."""
+    template = found.model.template
+    public = [n for n, seen in zip(template.names, template.public, strict=True) if seen]
+    names = chosen(public, options.parameters, found.model.name)
+    return names, [template.names.index(name) for name in names]
+
+
+def _with_targets(
+    found: AffineInference,
+    file: GlbFile,
+    binding: Binding,
+    names: Sequence[str],
+    options: SliderOptions,
+    keep: str,
+    measured: Mapping[str, Plane],
+) -> bytes:
+    offered = [_slider(found, name) for name in names]
+    targets = _targets(found, file, binding, offered, options.paired, keep)
+    asset = notes(found, keep, offered, _further(found, names, measured))
+    return add_targets(file, targets, asset, options.quantize)
+
+
+def _slider(found: AffineInference, name: str) -> Slider:
+    template = found.model.template
+    index = template.names.index(name)
+    entry = next(entry for entry in found.model.entries() if entry["name"] == name)
+    value, metre = float(found.parameters[index]), UNITS[found.unit]
+    low, high = (end / metre for end in entry["typical"])
+    ends = size_range(value, (low, high))
+    reach = [_within(_bounds(found), found.parameters, index, end) for end in ends]
+    return Slider(
+        name=name,
+        label=entry["label"],
+        group=entry["group"],
+        unit=found.unit,
+        kind=entry["kind"],
+        step=entry["step"] / metre,
+        value=value,
+        sigma=float(found.fit.sigma[index] / found.scale),
+        low=min(reach[0], value),
+        high=max(reach[1], value),
+    )
+
+
+def _within(bounds: Bounds, f: Array, index: int, end: float) -> float:
+    """The furthest that one parameter can go towards an end with every limit kept."""
+    step = np.zeros_like(f)
+    step[index] = end - f[index]
+    gaps, speeds = bounds.rows @ f + bounds.constants, bounds.rows @ step
+    falling = speeds < 0.0
+    share = np.min(np.maximum(gaps[falling], 0.0) / -speeds[falling], initial=1.0)
+    return float(f[index] + share * step[index])
+
+
+def _bounds(found: AffineInference) -> Bounds:
+    return Bounds.of(found.fit.template, found.parameters, LEAST / found.scale)
+
+
+def _targets(
+    found: AffineInference,
+    file: GlbFile,
+    binding: Binding,
+    offered: Sequence[Slider],
+    paired: bool,
+    keep: str,
+) -> Iterator[Target]:
+    """Each slider's morph targets; small displacements are left out, so that more are none."""
+    template = found.fit.template
+    _, anchor = template.anchor(keep)
+    turn = found.best.orientation
+    # What a normalised length is in the GLB, in metres.
+    metre = file_unit(found.mesh.format, found.unit) / found.fit.normalization.scale
+    size = float(np.linalg.norm(np.ptp(file.vertices, axis=0)))
+    every, rotation = np.arange(len(file.vertices)), turn.rotation
+    for slider in offered:
+        index = template.names.index(slider.name)
+        step = np.float64(found.scale)
+        column = binding.jacobian[:, :, index].astype(np.float64) - anchor[:, index]
+        shift = turn.to_own(column) * (step * metre)
+        largest = np.abs(slider.change) * _largest(shift)
+        shift[largest < SLIGHT * size / len(offered)] = 0.0
+        gradient = binding.gradient(index, every)
+        cells = dict(zip(gradient.cells, gradient.values * np.float32(step), strict=True))
+        stretch = Stretch(cells).between(rotation.T.astype(np.float32), rotation.astype(np.float32))
+        yield from targets_of(slider, shift, stretch, paired)
+
+
+def _largest(shift: Array) -> Array:
+    """``[V]`` largest coordinate of each displacement; column by column, several times faster."""
+    x, y, z = np.abs(shift).T
+    return np.maximum(np.maximum(x, y), z)
+
+
+def _measured(found: AffineInference, binding: Binding) -> dict[str, Plane]:
+    """Derived dimensions that edits take from the mesh itself, affine in the parameters."""
+    fit, f = found.fit, found.parameters
+    levels = find_levels(
+        found.vertices, found.mesh.faces, fit.template, fit.parameters, fit.translation
+    )
+    rows = {}
+    for name, reading in found.dimensions(binding.jacobian, levels).readings.items():
+        if reading.corrects:
+            value, row = reading.gauge.tangent(np.zeros_like(f))
+            rows[name] = (value - float(row @ f), row)
+    return rows
+
+
+def _further(
+    found: AffineInference, names: Sequence[str], measured: Mapping[str, Plane]
+) -> dict[str, Any]:
+    """Derived dimensions and hard limits, as functions of the offered parameters."""
+    template = found.model.template
+    kept = [template.names.index(name) for name in names]
+    others = np.setdiff1d(np.arange(len(template.names)), kept)
+    metre, rotation = UNITS[found.unit], found.best.orientation.rotation
+
+    def affine(row: Array, constant: float) -> dict[str, Any]:
+        return {
+            "constant": float(constant + row[others] @ found.parameters[others]),
+            "coefficients": {
+                name: float(row[index])
+                for name, index in zip(names, kept, strict=True)
+                if row[index]
+            },
+        }
+
+    derived = {}
+    for name, value in found.dimensions().derived(found.parameters).items():
+        dimension = template.derived[name]
+        typical = (dimension.typical[0] / metre, dimension.typical[1] / metre)
+        derived[name] = {
+            "label": dimension.label,
+            "group": dimension.group,
+            "unit": found.unit,
+            "value": value,
+            "range": list(size_range(value, typical)),
+        }
+        if name in measured:
+            constant, row = measured[name]
+            derived[name] |= affine(row, constant)
+        elif dimension.row is not None:
+            derived[name] |= affine(dimension.row[1:], dimension.row[0])
+        elif dimension.extent is not None:
+            derived[name]["axis"] = rotation["xyz".index(dimension.extent)].tolist()
+    bounds = _bounds(found)
+    rows = zip(bounds.texts, bounds.rows, bounds.constants, strict=True)
+    limits = [{"text": text, **affine(row, constant)} for text, row, constant in rows]
+    return {"derived": derived, "limits": [row for row in limits if row["coefficients"]]}

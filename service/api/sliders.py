@@ -1,0 +1,99 @@
+"""POST /sliders and POST /template: a mesh with its editing inside, and what was fitted to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Form, Request
+from starlette.responses import Response
+
+from service import pipeline
+from service.api.context import Context, Shared
+from service.api.filenames import derived_name
+from service.api.forms import SlidersForm, form_content_type, upload_of
+from service.api.mesh_response import MEDIA_TYPES, mesh_response
+from service.api.problems import documented
+from service.api.schemas import BINARY, MESH_HEADERS
+from service.api.store import MeshStore
+from service.encode.model import Model
+from service.requests import InferOptions, SliderOptions, Upload
+
+GLB = MEDIA_TYPES[".glb"]
+Make = Callable[[Upload, Mapping[str, Model], InferOptions, SliderOptions], bytes]
+
+router = APIRouter(tags=["shapes"])
+
+
+def _answers(description: str) -> dict[int | str, dict[str, Any]]:
+    return {
+        200: {"description": description, "content": {GLB: BINARY}, "headers": MESH_HEADERS},
+        304: {"description": "The client's `If-None-Match` names the answer."},
+        **documented(400, 404, 413, 415, 422, 500, 503),
+    }
+
+
+@router.post(
+    "/sliders",
+    summary="Put a mesh's parameters into it, as sliders",
+    description="Answers a GLB of the upload that any glTF viewer edits with no further request: "
+    "one morph target a parameter for rigid categories, a skeleton and shape morphs for bodies. "
+    "Materials, textures and nodes stay; other formats come as bare geometry, in metres.\n\n"
+    "    curl -F mesh=@chair.glb http://127.0.0.1:8000/sliders -OJ\n\n"
+    "Each mesh's `extras.targetNames` names its targets, and `extras.targets` says of each which "
+    "`parameter` it is, its `label`, `unit`, `value`, `range`, and the `change` that a weight of 1 "
+    "makes: the weight for a wanted value is `(wanted - value) / change`. "
+    "`asset.extras.shape_parameters` holds the rest of what `POST /infer` answers, the derived "
+    "dimensions and the limits. Weights in any combination do what `POST /edit` does. The joints "
+    "of a body say in their `extras` which parameters their rotation is.",
+    dependencies=[Depends(form_content_type)],
+    response_class=Response,
+    responses=_answers("The upload as a GLB with sliders."),
+)
+async def sliders(
+    request: Request,
+    form: Annotated[SlidersForm, Form(media_type="multipart/form-data")],
+    shared: Shared,
+) -> Response:
+    return await _answer(request, form, shared, pipeline.sliders, "sliders")
+
+
+@router.post(
+    "/template",
+    summary="See what was fitted to a mesh",
+    description="Answers a GLB of the fitted template, to be drawn over the upload: in its frame "
+    "and its unit, metres in a GLB, and with the sliders that `POST /sliders` gives the upload.",
+    dependencies=[Depends(form_content_type)],
+    response_class=Response,
+    responses=_answers("The fitted template as a GLB with sliders."),
+)
+async def template(
+    request: Request,
+    form: Annotated[SlidersForm, Form(media_type="multipart/form-data")],
+    shared: Shared,
+) -> Response:
+    return await _answer(request, form, shared, pipeline.template, "template")
+
+
+async def _answer(
+    request: Request, form: SlidersForm, shared: Context, make: Make, suffix: str
+) -> Response:
+    upload = await upload_of(request, form, shared.store)
+    models = await shared.readiness.models()
+    run = shared.workers.run
+    return await run(_made, request, form, upload, models, shared.store, make, suffix)
+
+
+def _made(
+    request: Request,
+    form: SlidersForm,
+    upload: Upload,
+    models: Mapping[str, Model],
+    store: MeshStore,
+    make: Make,
+    suffix: str,
+) -> Response:
+    data = make(upload, models, form.infer_options(), form.slider_options())
+    store.put(upload)
+    result = Upload(data, derived_name(upload.name, suffix, "glb"), GLB)
+    return mesh_response(request, result, result.mesh_id, {"Cache-Control": "private, no-cache"})
