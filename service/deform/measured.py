@@ -105,13 +105,20 @@ def _near(
     vertices: Array, faces: NDArray[np.int64], x: Array, z: Array, level: float
 ) -> NDArray[np.intp]:
     """The faces that reach into the band and over any of the lines at ``x`` and ``z``."""
-    y = vertices[:, 1][faces]
-    rows = np.flatnonzero((y.max(axis=1) >= level - BAND) & (y.min(axis=1) <= level + BAND))
+    low, high = _span(vertices, faces, 1)
+    rows = np.flatnonzero((high >= level - BAND) & (low <= level + BAND))
     for axis, ticks in ((0, x), (2, z)):
-        along = vertices[:, axis][faces[rows]]
-        first = np.searchsorted(ticks, along.min(axis=1))
-        rows = rows[first < np.searchsorted(ticks, along.max(axis=1), side="right")]
+        low, high = _span(vertices, faces[rows], axis)
+        first = np.searchsorted(ticks, low)
+        rows = rows[first < np.searchsorted(ticks, high, side="right")]
     return rows
+
+
+def _span(vertices: Array, faces: NDArray[np.int64], axis: int) -> tuple[Array, Array]:
+    """``[F]`` and ``[F]`` between which coordinates each face lies."""
+    along = np.ascontiguousarray(vertices[:, axis])
+    a, b, c = (along[faces[:, corner]] for corner in range(3))
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 def _first(
@@ -129,18 +136,19 @@ def _first(
     every = np.arange(len(lines))
     for start in range(0, len(faces), step):
         a, b, c = (vertices[faces[start : start + step, corner]] for corner in range(3))
-        weights = np.stack([_turn(b, c, lines), _turn(c, a, lines), _turn(a, b, lines)], axis=-1)
-        total = weights.sum(axis=-1, keepdims=True)
-        weights /= np.where(total == 0.0, np.nan, total)
-        y = np.einsum("nfk,fk->nf", weights, np.stack([a[:, 1], b[:, 1], c[:, 1]], axis=1))
-        with np.errstate(invalid="ignore"):
-            met = (weights >= 0.0).all(axis=-1) & (np.abs(y - level) <= BAND)
-        y = np.where(met, y, -np.inf)
+        weights = [_turn(b, c, lines), _turn(c, a, lines), _turn(a, b, lines)]
+        total = weights[0] + weights[1] + weights[2]
+        total[total == 0.0] = np.nan
+        for weight in weights:
+            weight /= total
+        y = weights[0] * a[:, 1] + weights[1] * b[:, 1] + weights[2] * c[:, 1]
+        inside = (weights[0] >= 0.0) & (weights[1] >= 0.0) & (weights[2] >= 0.0)
+        y[~(inside & (np.abs(y - level) <= BAND))] = -np.inf
         best = y.argmax(axis=1)
         higher = y[every, best] > height
         height[higher] = y[every, best][higher]
         face[higher] = start + best[higher]
-        corners[higher] = weights[every, best][higher]
+        corners[higher] = np.stack([weight[every, best] for weight in weights], axis=1)[higher]
     return height, face, corners
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from service import deadline
 from service.mesh.accessors import Accessor
 from service.mesh.additions import Additions
+from service.mesh.bounds import bounds
 from service.mesh.buffers import Draft
 from service.mesh.deltas import Deltas
 from service.mesh.document import Document, Object
@@ -88,6 +89,7 @@ class _Adding:
         self._names: list[str] = []
         self._extras: list[Object] = []
         self._moving: set[int] = set()
+        self._sizes: dict[int, float] = {}
         # By mesh, node and primitive.
         self._primitives: dict[int, dict[int, dict[int, _Primitive]]] = defaultdict(
             lambda: defaultdict(dict)
@@ -130,11 +132,18 @@ class _Adding:
             values = self._turns(use.attribute, accessor, placement, target, part)
             return self._deltas.directions(values)
         values = target.shift[part]
-        size = np.ptp(self._file.geometry.vertices[part], axis=0)
         if not placement.is_identity:
             values = times(placement.inverse, np.asarray(values, np.float64))
-            size = size / np.abs(np.linalg.det(placement.linear)).mean() ** (1 / 3)
-        return self._deltas.positions(values, float(np.linalg.norm(size)))
+        return self._deltas.positions(values, self._size(block))
+
+    def _size(self, block: Block) -> float:
+        """The diagonal of a block's box, in its own space."""
+        if block.start not in self._sizes:
+            vertices = self._file.geometry.vertices[block.start : block.start + block.count]
+            low, high = bounds(vertices)
+            grown = np.abs(np.linalg.det(block.placement.linear)).mean() ** (1 / 3)
+            self._sizes[block.start] = float(np.linalg.norm(high - low) / grown)
+        return self._sizes[block.start]
 
     def _turns(
         self, attribute: str, accessor: Accessor, placement: Placement, target: Target, part: slice
