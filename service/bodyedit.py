@@ -18,6 +18,7 @@ from service.edited import Measured, Moved, Shift
 from service.edits import Change
 from service.encode.bodymodel import SPREAD, stature
 from service.errors import InvalidRequest
+from service.namedentries import require_known
 from service.requests import EditOptions
 from service.template.anatomy import JOINTS, limits
 from service.template.skinned import NAMES, SHAPES, Body, SkinnedTemplate
@@ -50,7 +51,7 @@ def move(
             conflict.
     """
     template, before = found.model.template, found.fit.body
-    _require_known(found, (*edits, *constraints))
+    require_known(found.model.name, (*edits, *constraints), (*NAMES, STATURE))
     values = _values(found, edits)
     if constraints:
         values = constrain(found, values, edits, constraints)
@@ -71,17 +72,6 @@ def move(
         turn.maps_to_own(linear),
         _warnings(found.parameters, values),
     )
-
-
-def _require_known(found: BodyInference, named: tuple[str, ...]) -> None:
-    known = (*NAMES, STATURE)
-    unknown = [name for name in named if name not in known]
-    if unknown:
-        raise InvalidRequest(
-            "unknown_parameter",
-            f"{found.model.name} has no parameter {unknown[0][:80]!r}",
-            f"Known are {', '.join(known)}.",
-        )
 
 
 def _values(found: BodyInference, edits: Mapping[str, Change]) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from service.errors import InvalidRequest
@@ -55,3 +56,14 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _kind_of(value: Any) -> str:
     names = {dict: "object", list: "list", str: "text", bool: "truth value", type(None): "null"}
     return names.get(type(value), "number")
+
+
+def require_known(category: str, named: Iterable[str], known: Sequence[str]) -> None:
+    """Raise `InvalidRequest` (``unknown_parameter``) for a name that a category does not have."""
+    unknown = [name for name in named if name not in known]
+    if unknown:
+        raise InvalidRequest(
+            "unknown_parameter",
+            f"{category} has no parameter {unknown[0][:80]!r}",
+            f"Known are {', '.join(known)}.",
+        )

@@ -10,6 +10,7 @@ from service.errors import InvalidRequest
 from service.inference import Inference
 from service.mesh.stretch import Stretch
 from service.mesh.targets import Displacements, Target
+from service.namedentries import require_known
 from service.requests import UNITS, file_unit
 
 FARTHER = (0.7, 1.4)
@@ -66,13 +67,7 @@ def chosen(names: Sequence[str], wanted: Sequence[str] | None, category: str) ->
     """
     if wanted is None:
         return list(names)
-    unknown = [name for name in wanted if name not in names]
-    if unknown:
-        raise InvalidRequest(
-            "unknown_parameter",
-            f"{category} has no parameter {unknown[0][:80]!r} with a slider",
-            f"Known are {', '.join(names)}.",
-        )
+    require_known(category, wanted, names)
     if not wanted:
         raise InvalidRequest(
             "parameters_empty",

@@ -16,6 +16,7 @@ from service.deform.readings import Aim, Reading, read
 from service.deform.within import within
 from service.edits import Change
 from service.errors import InvalidRequest
+from service.namedentries import require_known
 from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
@@ -129,13 +130,7 @@ class Dimensions:
         template = self.template
         offered = [n for n, p in zip(template.names, template.public, strict=True) if p]
         known = [*offered, *template.derived]
-        unknown = [name for name in named if name not in known]
-        if unknown:
-            raise InvalidRequest(
-                "unknown_parameter",
-                f"{template.name} has no parameter {unknown[0][:80]!r}",
-                f"Known are {', '.join(known)}.",
-            )
+        require_known(template.name, named, known)
 
     def _change(self, values: Array) -> Array:
         return np.where(values == self.parameters, 0.0, values - self.parameters)
