@@ -7,9 +7,12 @@ from collections.abc import Callable
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 from viewing import Picture, Shoot, Viewer, changed, drawn, shown, typed, view
+
+from service.mesh.formats import read_mesh
 
 
 def handle(page: Page, name: str) -> tuple[float, float]:
@@ -248,3 +251,57 @@ def test_a_new_file_takes_the_place_of_the_last(chair_page: Page, viewer: Viewer
     viewer("airplane")
     expect(chair_page.locator("#panel h2")).to_have_text("Airplane")
     expect(chair_page.locator("[data-tool=undo]")).to_be_disabled()
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("chair", {"seat_width": 0.1, "leg_height": -0.05, "back_height": 0.1}),
+        ("human", {"left_elbow_y": -1.0, "right_hip_x": -0.7, "shape_0": 1.0, "shape_1": -0.5}),
+    ],
+)
+def test_the_loader_of_three_js_reads_what_an_edit_makes(
+    chair_page: Page,
+    service_client: httpx.Client,
+    sample: Callable[[str], bytes],
+    name: str,
+    changes: dict[str, float],
+) -> None:
+    read = chair_page.evaluate(THREE_JS_READS, {"name": name, "changes": changes})
+    assert set(changes) <= set(read["values"])
+    assert all(low <= value <= high for value, (low, high) in read["ranges"].values())
+    edits = {key: {"set": value} for key, value in read["values"].items() if key in changes}
+    files = {"mesh": (f"{name}.glb", sample(name))}
+    answer = service_client.post("/edit", files=files, data={"edits": json.dumps(edits)})
+    expected = read_mesh(answer.content, "a.glb").vertices
+    found = np.array(read["vertices"]).reshape(-1, 3)
+    size = np.linalg.norm(np.ptp(expected, axis=0))
+    # A body's mesh bends where it is bound to several joints, and its lowest point may be another.
+    tolerance = 1e-5 if name == "chair" else 3e-3
+    assert np.abs(found - expected).max() < tolerance * size
+
+
+THREE_JS_READS = """async ({ name, changes }) => {
+  const { Figure } = await import(new URL("web/js/figure.js", document.baseURI));
+  const THREE = await import("three");
+  const form = new FormData();
+  form.append("mesh", await (await fetch(`web/samples/${name}.glb`)).blob(), `${name}.glb`);
+  const answer = await fetch("sliders", { method: "POST", body: form });
+  const figure = await Figure.parse(await answer.arrayBuffer());
+  const parameters = Object.entries(figure.notes.parameters);
+  const moved = parameters.map(([key, p]) => [key, p.value + (changes[key] ?? 0)]);
+  const values = Object.fromEntries(moved);
+  figure.show(values);
+  figure.root.updateMatrixWorld(true);
+  const vertices = [];
+  const point = new THREE.Vector3();
+  for (const { mesh } of figure.meshes) {
+    for (let i = 0; i < mesh.geometry.attributes.position.count; i += 1) {
+      mesh.getVertexPosition(i, point).applyMatrix4(mesh.matrixWorld);
+      vertices.push(point.x, point.y, point.z);
+    }
+  }
+  const named = parameters.filter(([key]) => key in changes || !figure.joints.length);
+  const ranges = Object.fromEntries(named.map(([key, p]) => [key, [p.value, p.range]]));
+  return { values, vertices, ranges };
+}"""

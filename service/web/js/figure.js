@@ -2,6 +2,7 @@
 
 import * as THREE from "three";
 import { GLTFLoader } from "three/GLTFLoader";
+import { Bones } from "./bones.js";
 
 const CLAY = { color: 0xb9bcc4, roughness: 0.75, metalness: 0, side: THREE.DoubleSide };
 
@@ -22,6 +23,7 @@ export class Figure {
       if (node.userData.joint && names?.length === 3) this.joints.push({ node, names, rest: node.quaternion.clone() });
     });
     this.root.updateMatrixWorld(true);
+    this.bones = new Bones(this.root, this.notes?.parameters ?? {});
   }
 
   /** Move to these values; a parameter that none are given for stays as it was inferred. */
@@ -31,6 +33,7 @@ export class Figure {
         mesh.morphTargetInfluences[index] = ((values[parameter] ?? value) - value) / change;
       }
     }
+    this.bones.show(values);
     for (const { node, names, rest } of this.joints) {
       const vector = names.map((name) => values[name]);
       if (vector.includes(undefined)) node.quaternion.copy(rest);
