@@ -18,7 +18,8 @@ import torch
 from model_export.config import Config, load_config
 from model_export.losses import Weights
 from model_export.realistic import RealisticShapes
-from model_export.train import Trainer, run, validate, validation_set
+from model_export.train import Trainer, run
+from model_export.validation import validate, validation_set
 
 PAPER = {
     "L_sem": [35.2, 72.3, 87.2],

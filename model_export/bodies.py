@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
@@ -76,6 +76,15 @@ class BodyBatch:
     shape: Tensor
     scale: Tensor
     translation: Tensor
+
+    @property
+    def columns(self) -> list[Tensor]:
+        """The tensors, in the order that makes a batch of them again."""
+        return [getattr(self, field.name) for field in fields(self)]
+
+    def rows(self, rows: slice) -> BodyBatch:
+        """Some of the bodies."""
+        return BodyBatch(*(column[rows] for column in self.columns))
 
 
 class SyntheticBodies:

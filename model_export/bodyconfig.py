@@ -14,7 +14,7 @@ from model_export.bodylosses import BodyWeights
 
 @dataclass(frozen=True)
 class BodyConfig:
-    """Everything that decides a run.
+    """Everything that decides a run; the defaults are the shipped model's.
 
     Attributes:
         steps: optimiser steps.
@@ -31,12 +31,12 @@ class BodyConfig:
         seed: of everything random.
     """
 
-    steps: int = 4800
-    batch: int = 32
+    steps: int = 5600
+    batch: int = 256
     real_share: float = 0.125
     points: int = 1024
-    learning_rate: float = 1e-3
-    warmup: int = 300
+    learning_rate: float = 1.5e-3
+    warmup: int = 1000
     decay: float = 0.01
     precision: str = "bf16"
     width: int = 128

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -69,7 +70,7 @@ class BodyAnswer:
         count = len(JOINTS)
         votes = outputs[:, : 3 * count].unflatten(1, (count, 3))
         turned = orthonormal(outputs[:, 3 * count : 9 * count].unflatten(1, (count, 6)))
-        parents = turned[:, list(PARENTS[1:])].transpose(2, 3)
+        parents = turned.index_select(1, parents_on(turned.device)).transpose(2, 3)
         rotations = torch.cat([turned[:, :1], parents @ turned[:, 1:]], dim=1)
         shape = outputs[:, 9 * count : 9 * count + SHAPES]
         return cls(votes, turned, rotations, shape, outputs[:, -1].exp())
@@ -84,31 +85,39 @@ class BodyLosses:
         """
         Args:
             template: the body.
-            seed: of edits, and of the points on its surface.
+            seed: of the points on its surface.
             device: of the tensors.
         """
         self.device = torch.device(device)
-        self.generator = torch.Generator(self.device).manual_seed(seed)
+        generator = torch.Generator(self.device).manual_seed(seed)
         corners = torch.as_tensor(template.faces, device=self.device)
         rest, shapedirs, weights = map(
             self._tensor, (template.rest, template.shapedirs, template.weights)
         )
         sides = rest[corners[:, 1:]] - rest[corners[:, :1]]
         areas = torch.linalg.cross(sides[:, 0], sides[:, 1]).norm(dim=1)
-        face = corners[torch.multinomial(areas, SURFACE, True, generator=self.generator)]
+        face = corners[torch.multinomial(areas, SURFACE, True, generator=generator)]
         self.rest, self.shapedirs = rest[face].mean(1), shapedirs[face].mean(1)
         self.weights = weights[face].mean(1)
         self.joints, self.joint_dirs = map(self._tensor, (template.joints, template.joint_dirs))
 
     def synthetic(
-        self, answer: BodyAnswer, batch: BodyBatch, parts: Tensor, votes: Tensor
+        self, answer: BodyAnswer, batch: BodyBatch, parts: Tensor, votes: Tensor, edits: Tensor
     ) -> dict[str, Tensor]:
-        """Terms on labelled bodies; ``parts [B, ANCHORS, 24]`` are log odds, and ``votes
-        [B, ANCHORS, 24, 3]`` the anchors'."""
+        """Terms on labelled bodies.
+
+        Args:
+            answer: for them.
+            batch: the labels.
+            parts: ``[B, ANCHORS, 24]`` log odds.
+            votes: ``[B, ANCHORS, 24, 3]`` the anchors'.
+            edits: ``[B, 24, 3, 3]`` turns of the joints that the editing branch makes.
+        """
         turned, _ = pose_joints(batch.rotations, batch.joints, PARENTS)
-        placed = batch.joints[:, 0]
-        edits = self._edits(len(batch.joints))
-        terms = {
+        own = answer.rotations, answer.shape, answer.scale, answer.votes[:, 0]
+        truth = batch.rotations, batch.shape, batch.scale, batch.joints[:, 0]
+        gap = self._with_edits(*own, edits) - self._with_edits(*truth, edits)
+        return {
             "joint": (answer.votes - batch.joints).abs().sum(2).mean(),
             "vote": (votes - batch.joints[:, None]).abs().sum(3).mean(),
             "sem": geodesic_squared(answer.rotations, batch.rotations).mean()
@@ -118,17 +127,17 @@ class BodyLosses:
             "part": torch.nn.functional.cross_entropy(
                 parts.transpose(1, 2), batch.parts[:, :ANCHORS]
             ),
+            "rec": 2.0 * gap.abs().sum(2).mean(),
         }
-        truth = batch.rotations, batch.shape, batch.scale, placed
-        own = answer.rotations, answer.shape, answer.scale, answer.votes[:, 0]
-        terms["rec"] = sum(
-            (self.surface(own[0] @ edit, *own[1:]) - self.surface(truth[0] @ edit, *truth[1:]))
-            .abs()
-            .sum(2)
-            .mean()
-            for edit in (torch.eye(3, device=self.device), edits)
-        )
-        return terms
+
+    def _with_edits(
+        self, rotations: Tensor, shape: Tensor, scale: Tensor, pelvis: Tensor, edits: Tensor
+    ) -> Tensor:
+        """``[2 B, SURFACE, 3]`` points of bodies, and of the same ones edited."""
+        return self.surface(
+            torch.cat([rotations, rotations @ edits]),
+            shape.repeat(2, 1), scale.repeat(2), pelvis.repeat(2, 1),
+        )  # fmt: skip
 
     def similarity(self, answer: BodyAnswer, clouds: Tensor) -> Tensor:
         """Mean distance between real clouds ``[B, n, 3]`` and the bodies, both ways."""
@@ -144,16 +153,23 @@ class BodyLosses:
         points = skin(rest, self.weights, joints, turned, placed) - joints[:, :1]
         return scale[:, None, None] * points + pelvis[:, None]
 
-    def _edits(self, count: int) -> Tensor:
-        """``[count, 24, 3, 3]`` turns of a random third of the joints, the root not among them."""
-        size = (count, len(JOINTS), 3)
-        vectors = torch.rand(size, generator=self.generator, device=self.device) * 2 - 1
-        chosen = torch.rand(size[:2], generator=self.generator, device=self.device) < 1 / 3
-        chosen[:, 0] = False
-        return rotation_matrices(EDIT * vectors * chosen[..., None])
-
     def _tensor(self, array: object) -> Tensor:
         return torch.as_tensor(array, dtype=torch.float32, device=self.device)
+
+
+def draw_edits(count: int, generator: torch.Generator) -> Tensor:
+    """``[count, 24, 3, 3]`` turns of a random third of the joints, the root not among them."""
+    size = (count, len(JOINTS), 3)
+    vectors = torch.rand(size, generator=generator, device=generator.device) * 2 - 1
+    chosen = torch.rand(size[:2], generator=generator, device=generator.device) < 1 / 3
+    chosen[:, 0] = False
+    return rotation_matrices(EDIT * vectors * chosen[..., None])
+
+
+@functools.cache
+def parents_on(device: torch.device) -> Tensor:
+    """``[23]`` the parents of all joints but the root, kept where they are needed."""
+    return torch.tensor(PARENTS[1:], device=device)
 
 
 def geodesic_squared(first: Tensor, second: Tensor) -> Tensor:

@@ -84,7 +84,11 @@ class BodyEncoder(nn.Module):
     def tokens(self, points: Tensor, anchors: Tensor) -> Tensor:
         """``[B, ANCHORS, width]`` of the patches."""
         squared = (anchors * anchors).sum(2)[:, :, None] + (points * points).sum(2)[:, None]
-        distance = squared - 2.0 * anchors @ points.transpose(1, 2)
+        # Not a matrix product, which autocast would round: the nearest have to be the nearest.
+        products = [
+            anchors[:, :, None, axis] * points[:, None, :, axis] for axis in range(points.shape[2])
+        ]
+        distance = squared - 2.0 * (products[0] + products[1] + products[2])
         nearest = distance.topk(self.neighbours, dim=2, largest=False).indices
         index = nearest.flatten(1)[..., None].expand(-1, -1, 3)
         patches = points.gather(1, index).unflatten(1, (ANCHORS, self.neighbours))

@@ -71,7 +71,7 @@ class BodyError:
         encoder, refined: ``[24, 3]`` joints answered less the true ones, in millimetres at a
             stature of 1.7 m, in the axes of the truth's torso.
         facing: degrees between the torso's orientations.
-        seconds: that the refined answer took.
+        seconds: of processor time that the refined answer took.
     """
 
     known: KnownBody
@@ -139,9 +139,9 @@ def body_errors(
         if turn is not None:
             known = known.turned(Rotation.random(random_state=turn).as_matrix())
         rough = estimate_body(model, known.samples, refined=False, metre=1.0)
-        began = time.perf_counter()
+        began = time.process_time()
         fit = estimate_body(model, known.samples, refined=True, metre=1.0)
-        seconds = time.perf_counter() - began
+        seconds = time.process_time() - began
         own, rotation = torso(known.joints), STATURE / known.stature * 1000.0
         joints = [_joints(model.template, answer) for answer in (rough, fit)]
         encoder, refined = ((found - known.joints) * rotation @ own for found in joints)

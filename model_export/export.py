@@ -23,7 +23,7 @@ from model_export.realistic import RealisticShape, find_shapes
 from model_export.refit import refit
 from model_export.report import write_report
 from model_export.samples import clouds_of
-from model_export.train import template_copy
+from model_export.templatecopy import template_copy
 from model_export.truth import judge, read_truth, rescaled, summary
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
 from service.encode.model import AffineModel, file_digest, golden_cloud

@@ -23,11 +23,10 @@ from model_export.bodytruth import (
 from model_export.config import SHIPPED
 from model_export.discriminate import Data, assess, build
 from model_export.export import PAPER, check_onnx, describe_data, random_clouds
-from model_export.meshnet import MeshNet
 from model_export.onnxfile import write_network
 from model_export.realistic import RealisticShape
 from model_export.samples import clouds_of
-from model_export.train_mesh import median_error
+from model_export.train_mesh import median_error, network_of
 from model_export.train_mesh import write_onnx as write_mesh_onnx
 from service.encode.basemodel import file_digest
 from service.encode.bodymodel import BodyModel, golden_cloud
@@ -96,8 +95,7 @@ def export_mesh(folder: Path, template: SkinnedTemplate, path: Path) -> dict[str
     state = torch.load(folder / "checkpoint.pt", map_location="cpu")
     if state["template"] != template.digest:
         raise ValueError(f"the mesh encoder in {folder} was trained with another body")
-    network = MeshNet(template.faces, len(template.rest))
-    network.load_state_dict(state["network"])
+    network = network_of(state, template)
     file = path.with_suffix(MESH_SUFFIX)
     write_mesh_onnx(network, len(template.rest), file)
     return {

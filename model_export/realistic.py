@@ -1,7 +1,12 @@
-"""Unlabelled real shapes: any folder of meshes, sampled once and cached (section 4.1)."""
+"""Unlabelled real shapes: any folder of meshes, sampled once and cached (section 4.1).
+
+``python -m model_export.realistic DIR --out FILE`` writes those to train on to a file, for a
+machine that lacks the meshes.
+"""
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import json
 import zlib
@@ -19,6 +24,9 @@ from service.mesh.surface import RADIUS, sample_surface
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 CLOUD_SIZE = 8192
+CLOUDS_SUFFIX = ".npz"
+STEPS = 32767
+"""Of a coordinate from 0 to 1 in a file of clouds."""
 GROUPS = ("near_dup_group", "family", "group", "character")
 """Entries of a manifest that shapes too much alike to be on both sides of the split share."""
 
@@ -104,7 +112,7 @@ class RealisticShapes:
 
     def __init__(
         self,
-        folder: Path,
+        source: Path,
         cache: Path,
         seed: int,
         held_out: bool = False,
@@ -113,7 +121,7 @@ class RealisticShapes:
     ) -> None:
         """
         Args:
-            folder: of meshes; see `find_shapes`.
+            source: folder of meshes, see `find_shapes`; or a file that `write_clouds` wrote.
             cache: folder for sampled clouds.
             seed: of the order and of the points drawn.
             held_out: the test fifth instead of the training part.
@@ -122,9 +130,20 @@ class RealisticShapes:
         """
         self.device = torch.device(device)
         self.noise = noise
-        self.rng = np.random.default_rng(seed)
+        self.seed, self.drawn = seed, 0
+        self.generator = torch.Generator(self.device).manual_seed(seed)
         self.names: list[str] = []
         self.skipped: list[str] = []
+        if source.suffix == CLOUDS_SUFFIX:
+            self.names, clouds = read_clouds(source)
+        else:
+            clouds = self._sample(source, cache, held_out)
+        if not len(clouds):
+            raise ValueError(f"no readable mesh on this side of the split in {source}")
+        self.clouds = torch.as_tensor(clouds, device=device)
+
+    def _sample(self, folder: Path, cache: Path, held_out: bool) -> np.ndarray:
+        """``[k, 8192, 3]`` float32 clouds of one side, within -1 and 1."""
         clouds: list[np.ndarray] = []
         for shape in find_shapes(folder):
             if shape.held_out is not held_out:
@@ -136,34 +155,71 @@ class RealisticShapes:
                 continue
             clouds.append((cloud - cloud.mean(0)) / np.abs(cloud).max())
             self.names.append(shape.name)
-        if not clouds:
-            raise ValueError(f"no readable mesh on this side of the split in {folder}")
-        self.clouds = torch.as_tensor(np.stack(clouds), dtype=torch.float32, device=device)
-        self.order: list[int] = []  # of the shapes still to come in this round
+        return np.array(clouds, dtype=np.float32)
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def reseed(self, seed: int, drawn: int) -> None:
+        """Draw from a seed on, as one goes on that has drawn so many clouds."""
+        self.drawn = drawn
+        self.generator.manual_seed(seed)
+
+    def _next(self, count: int) -> np.ndarray:
+        """``[count]`` shapes that come next: each once in a round, each round in another order."""
+        size = len(self)
+        rounds = range(self.drawn // size, (self.drawn + count - 1) // size + 1)
+        orders = [np.random.default_rng([self.seed, index]).permutation(size) for index in rounds]
+        first = self.drawn % size
+        self.drawn += count
+        return np.concatenate(orders)[first : first + count]
 
     def batch(self, count: int, points: int) -> Tensor:
         """``[count, points, 3]`` normalised clouds: another draw of points each time.
 
         Half of them are mirrored left to right, which an object of these categories survives.
         """
-        while len(self.order) < count:
-            self.order.extend(self.rng.permutation(len(self)).tolist())
-        chosen, self.order = self.order[:count], self.order[count:]
-        pick = torch.as_tensor(self.rng.integers(0, CLOUD_SIZE, (count, points)))
-        clouds = self.clouds[torch.as_tensor(chosen)[:, None], pick]
-        flip = torch.as_tensor(self.rng.choice([-1.0, 1.0], (count, 1)), dtype=torch.float32)
-        clouds[..., 0] *= flip.to(self.device)
-        sigma = self.noise * self.rng.random((count, 1, 1)) ** 2
-        jitter = sigma * self.rng.standard_normal(clouds.shape)
+        chosen = torch.as_tensor(self._next(count), device=self.device)
+        settings = {"generator": self.generator, "device": self.device}
+        pick = torch.randint(CLOUD_SIZE, (count, points), **settings)
+        clouds = self.clouds[chosen[:, None], pick]
+        mirrored = torch.rand(count, 1, **settings) < 0.5
+        clouds[..., 0] *= torch.where(mirrored, -1.0, 1.0)
+        sigma = self.noise * torch.rand(count, 1, 1, **settings) ** 2
         extent = clouds.norm(dim=2).amax(1)[:, None, None]
-        jitter = torch.as_tensor(jitter, dtype=torch.float32, device=self.device)
-        return normalise(clouds + jitter * extent)
+        jitter = sigma * extent * torch.randn(clouds.shape, **settings)
+        return normalise(clouds + jitter)
 
 
 def normalise(clouds: Tensor) -> Tensor:
     """Zero mean, farthest point at radius 0.6, for ``[B, n, 3]``."""
     centred = clouds - clouds.mean(dim=1, keepdim=True)
     return centred * (RADIUS / centred.norm(dim=2).amax(dim=1))[:, None, None]
+
+
+def write_clouds(shapes: RealisticShapes, path: Path) -> None:
+    """Write the clouds to a file, to a 32767th of each's extent."""
+    numbers = np.rint(shapes.clouds.cpu().numpy() * STEPS).astype(np.int16)
+    np.savez_compressed(path, names=np.array(shapes.names), clouds=numbers)
+
+
+def read_clouds(path: Path) -> tuple[list[str], np.ndarray]:
+    """Names and ``[k, 8192, 3]`` float32 clouds of a file that `write_clouds` wrote."""
+    with np.load(path) as file:
+        return file["names"].tolist(), file["clouds"].astype(np.float32) / STEPS
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m model_export.realistic", description=__doc__)
+    parser.add_argument("realistic", type=Path, help="folder of unlabelled real meshes")
+    parser.add_argument("--out", type=Path, required=True, help=f"the file, {CLOUDS_SUFFIX}")
+    parser.add_argument("--cache", type=Path, default=Path("cache"), help="for sampled clouds")
+    arguments = parser.parse_args()
+    shapes = RealisticShapes(arguments.realistic, arguments.cache, 0)
+    write_clouds(shapes, arguments.out)
+    print(f"wrote {len(shapes)} shapes to train on, {len(shapes.skipped)} unreadable")
+
+
+if __name__ == "__main__":
+    main()

@@ -58,6 +58,15 @@ class Batch:
         """``[B, d + 3]`` parameters and translation."""
         return torch.cat([self.parameters, self.translation], dim=1)
 
+    @property
+    def columns(self) -> tuple[Tensor, ...]:
+        """The tensors, in the order that makes a batch of them again."""
+        return self.points, self.parameters, self.translation, self.variant
+
+    def rows(self, rows: slice) -> Batch:
+        """Some of the shapes."""
+        return Batch(*(column[rows] for column in self.columns))
+
 
 class SyntheticShapes:
     """Draws from the uniform box of a template's ranges; same seed, same shapes."""
@@ -89,6 +98,11 @@ class SyntheticShapes:
         self.face_part = torch.as_tensor(template.part[template.faces[:, 0]], device=device)
         self.hidden = torch.as_tensor(template.hidden, device=device)
         self.present = torch.as_tensor(present_parts(template), device=device)
+
+    def reseed(self, seed: int) -> None:
+        """Draw from a seed on, like one that was made with it."""
+        self.rng = np.random.default_rng(seed)
+        self.generator.manual_seed(seed)
 
     def draw_parameters(self, count: int) -> np.ndarray:
         """``[count, d]`` parameters in metres that keep the template's relations."""

@@ -4,32 +4,29 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import math
-import time
 from pathlib import Path
 from typing import Any
 
 import torch
-from tqdm import tqdm
+from torch import Tensor
 
 from model_export.bodies import BodyBatch, SyntheticBodies
 from model_export.bodyconfig import BodyConfig, load_body_config
-from model_export.bodylosses import BodyAnswer, BodyLosses
+from model_export.bodyerrors import joint_errors
+from model_export.bodylosses import BodyAnswer, BodyLosses, draw_edits
 from model_export.bodynet import BodyEncoder, spread_first
 from model_export.realistic import RealisticShapes
+from model_export.replay import Replayed
+from model_export.runs import Run, go_on, load_checkpoint, seed_of
 from service.encode.bodyoutputs import ANCHORS
-from service.template.anatomy import PARENTS
 from service.template.bodyfile import load_body
 from service.template.skinned import SkinnedTemplate
-from service.template.skinning import pose_joints
 
 VALIDATION_SEED = 20_000_003
-STATURE = 1.7
-"""Metres: joint errors are given for a body that tall."""
 
 
-class BodyTrainer:
+class BodyTrainer(Run):
     """A run: its network, data and progress, resumable from a checkpoint."""
 
     def __init__(
@@ -38,6 +35,9 @@ class BodyTrainer:
         template: SkinnedTemplate,
         realistic: RealisticShapes | None,
         device: str = "cpu",
+        *,
+        minutes: float | None = None,
+        recorded: bool = True,
     ) -> None:
         """
         Args:
@@ -45,51 +45,87 @@ class BodyTrainer:
             template: the body.
             realistic: unlabelled bodies; None trains on synthetic ones alone.
             device: where to train.
+            minutes: to train for; None for the configuration's steps.
+            recorded: on a GPU, record a step and replay it.
         """
+        super().__init__(config.steps, minutes, device)
         self.config, self.template, self.realistic = config, template, realistic
-        self.device = torch.device(device)
         torch.manual_seed(config.seed)
-        self.bodies = SyntheticBodies(template, config.garments, config.seed, device)
-        self.losses = BodyLosses(template, config.seed, device)
+        self.bodies = SyntheticBodies(template, config.garments, config.seed, self.device)
+        self.losses = BodyLosses(template, config.seed, self.device)
         usual = self.bodies.batch(256, 256).scale.log().mean().item()
         shape = config.width, config.depth, config.neighbours
         self.encoder = BodyEncoder(*shape, mean_log_scale=usual).to(self.device)
+        self.real = round(config.batch * config.real_share) if realistic else 0
+        gpu = self.device.type == "cuda"
+        # Where a step is recorded, the learning rate has to be a place in memory.
+        self.rate = torch.zeros((), device=self.device)
         self.optimizer = torch.optim.AdamW(
-            self.encoder.parameters(), config.learning_rate, weight_decay=config.decay
-        )
-        self.step, self.seconds = 0, 0.0
+            self.encoder.parameters(), self.rate, weight_decay=config.decay,
+            capturable=gpu, foreach=gpu,
+        )  # fmt: skip
+        self.learn = Replayed(self._learn) if gpu and recorded else self._learn
+        self._names: list[str] = []
+        self._block, self._drawn = -1, []
 
-    def train_step(self) -> dict[str, float]:
+    def train_step(self) -> dict[str, Tensor]:
         """One optimiser step; the terms of the loss."""
+        self.rate.fill_(self._learning_rate())
+        values = self.learn(*self._next())
+        self.step += 1
+        return dict(zip(self._names, values.unbind(), strict=True))
+
+    def _learn(self, real: Tensor, edits: Tensor, *columns: Tensor) -> Tensor:
+        """A step on ``[b, n, 3]`` real clouds and the columns of labelled bodies; the terms."""
         config = self.config
-        for group in self.optimizer.param_groups:
-            group["lr"] = self._learning_rate()
-        size = config.points
-        real = round(config.batch * config.real_share) if self.realistic else 0
-        batch = ordered(self.bodies.batch(config.batch - real, size))
-        clouds = batch.points
-        if self.realistic and real:
-            clouds = torch.cat([clouds, self._real(real, size)])
+        batch = BodyBatch(*columns)
+        clouds = torch.cat([batch.points, real])
         self.encoder.train()
         with torch.autocast(self.device.type, torch.bfloat16, enabled=config.precision == "bf16"):
             outputs, parts, votes = self.encoder.answers(clouds)
         count = len(batch.points)
         answer = BodyAnswer.of(outputs[:count])
-        terms = self.losses.synthetic(answer, batch, parts[:count], votes[:count])
-        if real:
-            terms["sim"] = self.losses.similarity(BodyAnswer.of(outputs[count:]), clouds[count:])
+        terms = self.losses.synthetic(answer, batch, parts[:count], votes[:count], edits)
+        if len(real):
+            terms["sim"] = self.losses.similarity(BodyAnswer.of(outputs[count:]), real)
         weights = dataclasses.asdict(config.weights)
         loss = torch.stack([weights[name] * value for name, value in terms.items()]).sum()
         self.optimizer.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.encoder.parameters(), 1.0)
         self.optimizer.step()
-        self.step += 1
-        return {"loss": loss.item(), **{name: value.item() for name, value in terms.items()}}
+        self._names = ["loss", *terms]
+        return torch.stack([loss, *terms.values()]).detach()
 
-    def _real(self, count: int, size: int) -> torch.Tensor:
+    def _next(self) -> list[Tensor]:
+        """What `_learn` takes at this step."""
+        block, index = divmod(self.step, self.ahead)
+        if block != self._block:
+            self._block, self._drawn = block, self._draw(block)
+        real, edits, batch = self._drawn
+        labelled = self.config.batch - self.real
+        rows = slice(labelled * index, labelled * (index + 1))
+        clouds = real[self.real * index : self.real * (index + 1)]
+        return [clouds, edits[rows], *batch.rows(rows).columns]
+
+    @torch.no_grad()
+    def _draw(self, block: int) -> tuple[Tensor, Tensor, BodyBatch]:
+        """Real clouds, edits and labelled bodies of some steps; their numbers decide them."""
+        config, seed = self.config, seed_of(self.config.seed, block)
+        self.bodies.generator.manual_seed(seed)
+        count = self.ahead * (config.batch - self.real)
+        batch = ordered(self.bodies.batch(count, config.points))
+        edits = draw_edits(count, self.bodies.generator)
+        real = batch.points[:0]
+        if self.realistic and self.real:
+            size = self.ahead * self.real
+            self.realistic.reseed(seed, block * size)
+            real = self._real(size)
+        return real, edits, batch
+
+    def _real(self, count: int) -> Tensor:
         assert self.realistic is not None
-        clouds = self.realistic.batch(count, size)
+        clouds = self.realistic.batch(count, self.config.points)
         clouds = clouds @ self.bodies.orientations(count).transpose(1, 2)
         order = spread_first(clouds, ANCHORS)
         return clouds.gather(1, order[..., None].expand(-1, -1, 3))
@@ -97,7 +133,7 @@ class BodyTrainer:
     def _learning_rate(self) -> float:
         config = self.config
         rise = min(1.0, (self.step + 1) / max(1, config.warmup))
-        fall = 0.5 * (1 + math.cos(math.pi * min(1.0, self.step / config.steps)))
+        fall = 0.5 * (1 + math.cos(math.pi * self.share))
         return config.learning_rate * rise * (fall + 1e-3)
 
     def state(self) -> dict[str, Any]:
@@ -107,28 +143,17 @@ class BodyTrainer:
             "template": self.template.digest,
             "encoder": self.encoder.state_dict(),
             "optimizer": self.optimizer.state_dict(),
-            "random": [
-                torch.get_rng_state(),
-                self.bodies.generator.get_state(),
-                self.losses.generator.get_state(),
-            ],
             "step": self.step,
             "seconds": self.seconds,
-            "place": self._place(),
+            "place": self.place,
         }
 
-    def _place(self) -> str:
-        if self.device.type == "cuda":
-            return torch.cuda.get_device_name(self.device)
-        return f"CPU, threads: {torch.get_num_threads()}"
-
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint of the same configuration."""
+        """Go on from a checkpoint of the same configuration, made on the same kind of device."""
         self.encoder.load_state_dict(state["encoder"])
         self.optimizer.load_state_dict(state["optimizer"])
-        torch.set_rng_state(state["random"][0])
-        self.bodies.generator.set_state(state["random"][1])
-        self.losses.generator.set_state(state["random"][2])
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.rate
         self.step, self.seconds = state["step"], state["seconds"]
 
     def start_from(self, state: dict[str, Any]) -> None:
@@ -148,56 +173,19 @@ def ordered(batch: BodyBatch) -> BodyBatch:
     )
 
 
-@torch.no_grad()
-def joint_errors(encoder: BodyEncoder, losses: BodyLosses, batch: BodyBatch) -> dict[str, float]:
-    """Mean joint error in mm at a stature of 1.7 m, and median rotation error in degrees.
-
-    ``votes`` are the joints as they are voted for, ``posed`` those of the answered pose, ``turn``
-    is of the rotations in space.
-    """
-    encoder.eval()
-    answer = BodyAnswer.of(torch.cat([encoder(chunk) for chunk in batch.points.split(32)]))
-    rest = losses.joints + torch.einsum("jck,bk->bjc", losses.joint_dirs, answer.shape)
-    placed = pose_joints(answer.rotations, rest, PARENTS)[1] - rest[:, :1]
-    posed = answer.scale[:, None, None] * placed + answer.votes[:, :1]
-    turned, _ = pose_joints(batch.rotations, batch.joints, PARENTS)
-    metre = batch.scale[:, None]
-    cosine = ((answer.turned.transpose(2, 3) @ turned).diagonal(dim1=2, dim2=3).sum(2) - 1) / 2
-    return {
-        "votes": 1000 * ((answer.votes - batch.joints).norm(dim=2) / metre).mean().item(),
-        "posed": 1000 * ((posed - batch.joints).norm(dim=2) / metre).mean().item(),
-        "turn": torch.rad2deg(torch.acos(cosine.clamp(-1, 1))).median().item(),
-    }
-
-
 def run(trainer: BodyTrainer, folder: Path, every: int, until: int | None = None) -> None:
-    """Train to the end, with a checkpoint, a log line and validation figures every so often."""
-    folder.mkdir(parents=True, exist_ok=True)
-    if trainer.step == 0:
-        (folder / "log.jsonl").unlink(missing_ok=True)
+    """Train to the end, with checkpoints, log lines and validation figures every so often."""
     fresh = SyntheticBodies(
         trainer.template, trainer.config.garments, VALIDATION_SEED, trainer.device
     )
     batch = ordered(fresh.batch(192, trainer.config.points))
-    last = min(until or trainer.config.steps, trainer.config.steps)
-    bar = tqdm(total=trainer.config.steps, initial=trainer.step, unit="step", mininterval=10.0)
-    began = time.monotonic() - trainer.seconds
-    means: dict[str, float] = {}
-    while trainer.step < last:
-        for name, value in trainer.train_step().items():
-            means[name] = 0.98 * means.get(name, value) + 0.02 * value
-        bar.update()
-        if trainer.step % every == 0 or trainer.step == last:
-            trainer.seconds = time.monotonic() - began
-            torch.save(trainer.state(), folder / "checkpoint.part")
-            (folder / "checkpoint.part").replace(folder / "checkpoint.pt")
-            errors = joint_errors(trainer.encoder, trainer.losses, batch)
-            line = {"step": trainer.step, "seconds": round(trainer.seconds), **means, **errors}
-            with (folder / "log.jsonl").open("a") as log:
-                log.write(json.dumps({k: round(v, 4) for k, v in line.items()}) + "\n")
-            figures = ", ".join(f"{name} {value:.1f}" for name, value in errors.items())
-            bar.write(f"step {trainer.step}: {figures}")
-    bar.close()
+
+    def measure() -> tuple[dict[str, Any], str]:
+        errors = joint_errors(trainer.encoder, trainer.losses, batch)
+        figures = {name: round(value, 4) for name, value in errors.items()}
+        return figures, ", ".join(f"{name} {value:.1f}" for name, value in errors.items())
+
+    go_on(trainer, folder, every, measure, until)
 
 
 def main() -> None:
@@ -205,15 +193,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m model_export.train_body", description=__doc__)
     parser.add_argument("--config", type=Path, help="YAML file (default: the shipped model's)")
     parser.add_argument("--body", type=Path, help="body file (default: the shipped body)")
-    parser.add_argument("--realistic", type=Path, help="folder of unlabelled real bodies")
+    parser.add_argument(
+        "--realistic", type=Path,
+        help="folder of unlabelled real bodies, or file of clouds (model_export.realistic)",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path("runs/human"), help="folder of the run")
     parser.add_argument("--cache", type=Path, default=Path("cache"), help="for sampled clouds")
     parser.add_argument("--start-from", type=Path, help="checkpoint of another run to go on from")
     parser.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
+    parser.add_argument("--minutes", type=float, help="train so long, not a number of steps")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
+    parser.add_argument("--eager", action="store_true", help="on a GPU: don't record a step")
     parser.add_argument("--threads", type=int, help="CPU threads (default: all)")
     parser.add_argument("--steps", type=int, help="instead of the configuration's")
-    parser.add_argument("--every", type=int, default=500, help="steps between checkpoints")
+    parser.add_argument("--every", type=int, default=500, help="steps between measurements")
     arguments = parser.parse_args()
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
@@ -229,11 +222,14 @@ def main() -> None:
             arguments.realistic, arguments.cache, config.seed, device=arguments.device
         )
         print(f"{len(realistic)} real bodies to train on, {len(realistic.skipped)} unreadable")
-    trainer = BodyTrainer(config, load_body(arguments.body), realistic, arguments.device)
+    trainer = BodyTrainer(
+        config, load_body(arguments.body), realistic, arguments.device, minutes=arguments.minutes,
+        recorded=not arguments.eager,
+    )  # fmt: skip
     if arguments.start_from:
-        trainer.start_from(torch.load(arguments.start_from, map_location=arguments.device))
+        trainer.start_from(load_checkpoint(arguments.start_from))
     if arguments.resume:
-        trainer.restore(torch.load(arguments.out / "checkpoint.pt", map_location=arguments.device))
+        trainer.restore(load_checkpoint(arguments.out / "checkpoint.pt"))
     run(trainer, arguments.out, arguments.every)
 
 

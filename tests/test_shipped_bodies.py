@@ -88,6 +88,17 @@ def test_the_templates_own_connectivity_is_read_exactly(
     assert values["shape_0"] == pytest.approx(strider.shape[0], abs=0.05)
 
 
+@pytest.mark.parametrize("reader", ["point", "mesh"])
+def test_the_encoders_are_near_by_themselves(
+    human: SkinnedTemplate, strider: Body, models: dict[str, Model], reader: str
+) -> None:
+    own = saved(human, strider, "glb") if reader == "mesh" else without_a_foot(human, strider)
+    answer = infer(own, models, InferOptions(category="human", refine=False)).report()
+    assert answer["fit"]["encoder"] == reader
+    gaps = np.linalg.norm(joints_of(answer) - human.posed_joints(strider), axis=1)
+    assert gaps.mean() < 0.05
+
+
 def test_a_bent_elbow_moves_the_forearm_alone(
     human: SkinnedTemplate, strider: Body, models: dict[str, Model]
 ) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+import model_export
 from model_export.bodyconfig import BodyConfig, load_body_config
 
 
@@ -16,3 +17,10 @@ def test_settings_come_from_a_file(tmp_path: Path) -> None:
     path.write_text("stepz: 7\n")
     with pytest.raises(ValueError, match="stepz"):
         load_body_config(path)
+
+
+def test_a_body_can_be_trained_on_a_cpu() -> None:
+    config = load_body_config(Path(model_export.__file__).parent / "configs" / "human-cpu.yaml")
+    shipped = BodyConfig()
+    assert config.steps * config.batch < 0.2 * shipped.steps * shipped.batch
+    assert (config.width, config.depth) == (shipped.width, shipped.depth)

@@ -8,7 +8,7 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from model_export.bodies import BodyBatch, Garments, SyntheticBodies
-from model_export.bodylosses import BodyAnswer, BodyLosses, geodesic_squared
+from model_export.bodylosses import BodyAnswer, BodyLosses, draw_edits, geodesic_squared
 from model_export.train_body import ordered
 from service.encode.bodyoutputs import ANCHORS
 from service.template.anatomy import JOINTS, PARENTS
@@ -34,10 +34,11 @@ def truth(batch: BodyBatch) -> BodyAnswer:
     return BodyAnswer(batch.joints, turned, batch.rotations, batch.shape, batch.scale)
 
 
-def votes_of(batch: BodyBatch) -> tuple[torch.Tensor, torch.Tensor]:
-    """What perfect anchors answer."""
+def votes_of(batch: BodyBatch) -> tuple[torch.Tensor, ...]:
+    """What perfect anchors answer, and edits."""
     parts = 20.0 * torch.nn.functional.one_hot(batch.parts[:, :ANCHORS], COUNT).float()
-    return parts, batch.joints[:, None].expand(-1, ANCHORS, -1, -1)
+    edits = draw_edits(len(batch.joints), torch.Generator().manual_seed(0))
+    return parts, batch.joints[:, None].expand(-1, ANCHORS, -1, -1), edits
 
 
 def test_outputs_are_taken_apart(batch: BodyBatch, truth: BodyAnswer) -> None:
@@ -98,6 +99,13 @@ def test_bodies_are_near_their_own_clouds_and_far_from_others(
     own = losses.similarity(truth, batch.points)
     others = losses.similarity(truth, batch.points.roll(1, dims=0))
     assert own < 0.5 * others
+
+
+def test_edits_leave_the_root_and_most_joints_as_they_are() -> None:
+    edits = draw_edits(50, torch.Generator().manual_seed(0))
+    kept = torch.isclose(edits, torch.eye(3), atol=1e-6).all(dim=3).all(dim=2)
+    assert kept[:, 0].all()
+    assert 0.6 < kept[:, 1:].float().mean() < 0.73
 
 
 def test_geodesic_distance_is_the_angle() -> None:

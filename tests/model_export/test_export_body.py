@@ -87,10 +87,11 @@ def test_what_is_exported_can_be_served(
 def test_a_mesh_encoder_is_exported_with_its_body_only(
     human: SkinnedTemplate, tmp_path: Path
 ) -> None:
-    network = MeshNet(human.faces, len(human.rest))
+    middles = np.arange(0, 60, 20)
+    network = MeshNet(human.faces, len(human.rest), middles)
     state = {
-        "network": network.state_dict(), "template": human.digest, "step": 5, "batch": 2,
-        "seconds": 360.0, "place": "CPU, 1 thread",
+        "network": network.state_dict(), "middles": middles.tolist(), "template": human.digest,
+        "step": 5, "batch": 2, "seconds": 360.0, "place": "CPU, 1 thread",
     }  # fmt: skip
     (tmp_path / "run").mkdir()
     torch.save(state, tmp_path / "run" / "checkpoint.pt")

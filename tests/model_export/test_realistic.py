@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from model_export import realistic
 from model_export.realistic import (
     CLOUD_SIZE,
     RealisticShapes,
@@ -183,3 +184,27 @@ def test_normalise_is_the_services_normalisation() -> None:
     clouds = torch.randn(3, 50, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
     for cloud, done in zip(clouds.numpy(), normalise(clouds).numpy(), strict=True):
         np.testing.assert_allclose(done, Normalization.of(cloud).apply(cloud), atol=1e-12)
+
+
+def test_clouds_can_be_taken_to_a_machine_without_the_meshes(
+    listed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    file = tmp_path / "clouds.npz"
+    arguments = ["realistic", str(listed), "--out", str(file), "--cache", str(tmp_path / "cache")]
+    monkeypatch.setattr("sys.argv", arguments)
+    realistic.main()
+    assert "wrote 32 shapes to train on, 0 unreadable" in capsys.readouterr().out
+    here = RealisticShapes(listed, tmp_path / "cache", seed=0)
+    there = RealisticShapes(file, tmp_path / "no cache", seed=0)
+    assert there.names == here.names
+    assert torch.allclose(there.clouds, here.clouds, atol=2e-5)
+    assert torch.allclose(there.batch(5, 100), here.batch(5, 100), atol=1e-3)
+
+
+def test_what_is_drawn_can_be_drawn_again_from_anywhere(listed: Path, tmp_path: Path) -> None:
+    first, second = (RealisticShapes(listed, tmp_path / "cache", seed=0) for _ in range(2))
+    first.batch(40, 10)
+    first.reseed(7, 40)
+    second.reseed(7, 40)
+    assert torch.equal(first.batch(9, 50), second.batch(9, 50))

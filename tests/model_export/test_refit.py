@@ -5,10 +5,10 @@ import copy
 import torch
 
 from model_export.config import Config
+from model_export.labels import label_statistics
 from model_export.networks import PointNet
 from model_export.refit import refit
 from model_export.synthetic import Augmentation, SyntheticShapes
-from model_export.train import label_statistics
 from service.template.affine import AffineTemplate
 
 

@@ -10,9 +10,9 @@ import trimesh
 from model_export.bodies import Garments, SyntheticBodies
 from model_export.bodyconfig import BodyConfig
 from model_export.realistic import RealisticShapes
+from model_export.runs import load_checkpoint
 from model_export.train_body import (
     BodyTrainer,
-    joint_errors,
     ordered,
     run,
 )
@@ -49,20 +49,20 @@ def test_a_step_trains_on_both_kinds(human: SkinnedTemplate, real: RealisticShap
 
 def test_training_lessens_the_loss(human: SkinnedTemplate) -> None:
     trainer = BodyTrainer(BodyConfig(**(vars(SMALL) | {"steps": 60, "batch": 8})), human, None)
-    losses = [trainer.train_step()["loss"] for _ in range(60)]
+    losses = [trainer.train_step()["loss"].item() for _ in range(60)]
     assert sum(losses[-10:]) < 0.85 * sum(losses[:10])
 
 
 def test_a_resumed_run_is_the_same(
     human: SkinnedTemplate, real: RealisticShapes, tmp_path: Path
 ) -> None:
-    whole = BodyTrainer(SMALL, human, None)
+    whole = BodyTrainer(SMALL, human, real)
     for _ in range(6):
         whole.train_step()
-    first = BodyTrainer(SMALL, human, None)
+    first = BodyTrainer(SMALL, human, real)
     run(first, tmp_path / "run", every=3, until=3)
-    second = BodyTrainer(SMALL, human, None)
-    second.restore(torch.load(tmp_path / "run" / "checkpoint.pt"))
+    second = BodyTrainer(SMALL, human, real)
+    second.restore(load_checkpoint(tmp_path / "run" / "checkpoint.pt"))
     for _ in range(3):
         second.train_step()
     for a, b in zip(whole.encoder.parameters(), second.encoder.parameters(), strict=True):
@@ -87,12 +87,3 @@ def test_anchors_come_first_with_all_that_is_theirs(human: SkinnedTemplate) -> N
     for index in range(2):
         where = torch.cdist(sorted_batch.points[index], batch.points[index]).argmin(dim=1)
         assert torch.equal(sorted_batch.normals[index], batch.normals[index][where])
-
-
-def test_errors_are_in_millimetres(human: SkinnedTemplate) -> None:
-    trainer = BodyTrainer(SMALL, human, None)
-    batch = ordered(SyntheticBodies(human, Garments.none(), 0).batch(4, 160))
-    errors = joint_errors(trainer.encoder, trainer.losses, batch)
-    assert 100 < errors["votes"] < 1500
-    assert 100 < errors["posed"] < 1500
-    assert 10 < errors["turn"] < 180

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +10,19 @@ import torch
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from model_export.meshbodies import MeshBodies
 from model_export.meshnet import MeshNet
-from model_export.train_mesh import MeshBodies, loss_of, median_error, train, turns_of, write_onnx
+from model_export.runs import load_checkpoint
+from model_export.train_mesh import (
+    MeshTrainer,
+    fit_last,
+    loss_of,
+    median_error,
+    network_of,
+    run,
+    turns_of,
+    write_onnx,
+)
 from service.encode.meshencoder import MeshEncoder
 from service.errors import ModelFault
 from service.template.skinned import SkinnedTemplate, body_of
@@ -19,7 +31,9 @@ from service.template.skinned import SkinnedTemplate, body_of
 @pytest.fixture(scope="module")
 def network(human: SkinnedTemplate) -> MeshNet:
     torch.manual_seed(0)
-    return MeshNet(human.faces, len(human.rest), heads=2).eval()
+    network = MeshNet(human.faces, len(human.rest), np.arange(0, 6000, 500), heads=2).eval()
+    torch.nn.init.normal_(network.last.weight, std=0.02)
+    return network
 
 
 @pytest.fixture(scope="module")
@@ -29,16 +43,6 @@ def served(
     path = tmp_path_factory.mktemp("mesh") / "human.mesh.onnx"
     write_onnx(network, len(human.rest), path)
     return MeshEncoder(path, human)
-
-
-def test_bodies_are_drawn_with_their_torso_upright(human: SkinnedTemplate) -> None:
-    vertices, turned, shape = MeshBodies(human, 0).batch(3)
-    assert vertices.shape == (3, len(human.rest), 3)
-    assert torch.allclose(vertices.norm(dim=2).amax(dim=1), torch.full((3,), 0.6), atol=1e-5)
-    assert (turned[:, 3, 1, 1] > 0.7).all()
-    assert shape.shape == (3, 3)
-    again = MeshBodies(human, 0).batch(3)
-    assert torch.equal(vertices, again[0])
 
 
 def test_the_loss_is_least_at_the_truth() -> None:
@@ -54,10 +58,36 @@ def test_the_loss_is_least_at_the_truth() -> None:
 
 def test_a_run_goes_on_where_it_stopped(human: SkinnedTemplate, tmp_path: Path) -> None:
     small = small_template(human)
-    train(small, tmp_path / "run", steps=2, batch=1, resume=False)
-    state = train(small, tmp_path / "run", steps=3, batch=1, resume=True)
+    run(MeshTrainer(small, 3, 1), tmp_path, every=2, fitted=32, until=2)
+    trainer = MeshTrainer(small, 3, 1)
+    trainer.restore(load_checkpoint(tmp_path / "checkpoint.pt"))
+    assert trainer.step == 2
+    run(trainer, tmp_path, every=2, fitted=32)
+    assert len((tmp_path / "log.jsonl").read_text().splitlines()) == 2
+    state = load_checkpoint(tmp_path / "checkpoint.pt")
     assert state["step"] == 3
-    assert len((tmp_path / "run" / "log.jsonl").read_text().splitlines()) == 2
+    # With its last layer fitted once more.
+    vertices, _, _ = trainer.bodies.batch(1)
+    with torch.no_grad():
+        assert torch.equal(network_of(state, small)(vertices), trainer.network(vertices))
+
+
+def test_a_step_is_the_same_whenever_it_is_taken(human: SkinnedTemplate) -> None:
+    small = small_template(human)
+    whole, half = MeshTrainer(small, 4, 2), MeshTrainer(small, 4, 2)
+    losses = [whole.train_step()["loss"].item() for _ in range(2)]
+    state = copy.deepcopy(whole.state())
+    losses.append(whole.train_step()["loss"].item())
+    half.restore(state)
+    assert half.train_step()["loss"].item() == losses[2]
+
+
+def test_a_fitted_last_layer_answers_better(human: SkinnedTemplate) -> None:
+    small = small_template(human)
+    trainer = MeshTrainer(small, 1, 1)
+    before = median_error(trainer.network, small, 10)
+    fit_last(trainer.network, trainer.bodies, 64, 32)
+    assert median_error(trainer.network, small, 10) < 0.8 * before
 
 
 def small_template(human: SkinnedTemplate) -> SkinnedTemplate:
