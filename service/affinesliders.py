@@ -19,6 +19,7 @@ from service.deform.unfold import unfold
 from service.mesh.convert import convert
 from service.mesh.embedding import as_glb
 from service.mesh.glb import GlbFile
+from service.mesh.polygons import Indices
 from service.mesh.stretch import Stretch
 from service.mesh.targets import Target, add_targets
 from service.requests import UNITS, SliderOptions, file_unit
@@ -48,8 +49,8 @@ def sliders(found: AffineInference, options: SliderOptions, keep: str) -> bytes:
     deadline.check()
     binding = unfold(binding, found.vertices, found.mesh.faces, found.fit.parameters, indices)
     deadline.check()
-    file = as_glb(found.mesh, file_unit(found.mesh.format, found.unit))
-    return _with_targets(found, file, binding, names, options, keep, _measured(found, binding))
+    shown = as_glb(found.mesh, file_unit(found.mesh.format, found.unit))
+    return _with_targets(found, shown, binding, names, options, keep, _measured(found, binding))
 
 
 def template(found: AffineInference, options: SliderOptions, keep: str) -> bytes:
@@ -63,7 +64,8 @@ def template(found: AffineInference, options: SliderOptions, keep: str) -> bytes
     still = np.zeros((1, 9, len(followed.names)), np.float32)
     none = np.zeros((len(vertices), 1), np.float32)
     binding = Binding(followed.jacobian.astype(np.float32), none, still)
-    return _with_targets(found, file, binding, names, options, keep, {})
+    shown = (file, np.arange(len(vertices)))
+    return _with_targets(found, shown, binding, names, options, keep, {})
 
 
 def _chosen(found: AffineInference, options: SliderOptions) -> tuple[list[str], list[int]]:
@@ -76,7 +78,7 @@ def _chosen(found: AffineInference, options: SliderOptions) -> tuple[list[str], 
 
 def _with_targets(
     found: AffineInference,
-    file: GlbFile,
+    shown: tuple[GlbFile, Indices],
     binding: Binding,
     names: Sequence[str],
     options: SliderOptions,
@@ -84,9 +86,9 @@ def _with_targets(
     measured: Mapping[str, Plane],
 ) -> bytes:
     offered = [_slider(found, name) for name in names]
-    targets = _targets(found, file, binding, offered, options.paired, keep)
+    targets = _targets(found, shown, binding, offered, options.paired, keep)
     asset = notes(found, keep, offered, _further(found, names, measured))
-    return add_targets(file, targets, asset, options.quantize)
+    return add_targets(shown[0], targets, asset, options.quantize)
 
 
 def _slider(found: AffineInference, name: str) -> Slider:
@@ -127,20 +129,24 @@ def _bounds(found: AffineInference) -> Bounds:
 
 def _targets(
     found: AffineInference,
-    file: GlbFile,
+    shown: tuple[GlbFile, Indices],
     binding: Binding,
     offered: Sequence[Slider],
     paired: bool,
     keep: str,
 ) -> Iterator[Target]:
-    """Each slider's morph targets; small displacements are left out, so that more are none."""
+    """Each slider's morph targets; small displacements are left out, so that more are none.
+
+    `shown` is a GLB, and the bound vertex that each of its vertices is.
+    """
+    file, of = shown
     template = found.fit.template
     _, anchor = template.anchor(keep)
     turn = found.best.orientation
     # What a normalised length is in the GLB, in metres.
     metre = file_unit(found.mesh.format, found.unit) / found.fit.normalization.scale
     size = float(np.linalg.norm(np.ptp(file.vertices, axis=0)))
-    every, rotation = np.arange(len(file.vertices)), turn.rotation
+    every, rotation = np.arange(len(binding.jacobian)), turn.rotation
     for slider in offered:
         index = template.names.index(slider.name)
         step = np.float64(found.scale)
@@ -151,7 +157,7 @@ def _targets(
         gradient = binding.gradient(index, every)
         cells = dict(zip(gradient.cells, gradient.values * np.float32(step), strict=True))
         stretch = Stretch(cells).between(rotation.T.astype(np.float32), rotation.astype(np.float32))
-        yield from targets_of(slider, shift, stretch, paired)
+        yield from targets_of(slider, shift[of], stretch.at(of), paired)
 
 
 def _largest(shift: Array) -> Array:

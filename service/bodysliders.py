@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from service.errors import InvalidRequest
 from service.mesh.convert import convert
 from service.mesh.embedding import as_glb
 from service.mesh.glb import GlbFile
+from service.mesh.polygons import Indices
 from service.mesh.rig import Joint, Rig, add_rig
 from service.mesh.stretch import Stretch
 from service.mesh.targets import Target, add_targets
@@ -50,8 +51,8 @@ def sliders(found: BodyInference, options: SliderOptions, keep: str) -> bytes:
         found.vertices, found.mesh.faces, found.model.template, found.fit.body
     )
     deadline.check()
-    file = unskinned(as_glb(found.mesh, file_unit(found.mesh.format, found.unit)))
-    return _Rigged(found, binding, options, keep).write(file)
+    file, of = as_glb(found.mesh, file_unit(found.mesh.format, found.unit))
+    return _Rigged(found, binding, options, keep, of).write(unskinned(file))
 
 
 def template(found: BodyInference, options: SliderOptions, keep: str) -> bytes:
@@ -63,18 +64,25 @@ def template(found: BodyInference, options: SliderOptions, keep: str) -> bytes:
     own = found.best.orientation.to_own(found.fit.normalization.invert(posed))
     own *= file_unit(found.mesh.format, found.unit)
     file = GlbFile(convert(own, body.faces, "glb"))
-    return _Rigged(found, binding, options, keep).write(file)
+    return _Rigged(found, binding, options, keep, np.arange(len(own))).write(file)
 
 
 class _Rigged:
     """A body's mesh, bound, on its way to a GLB with a skeleton."""
 
     def __init__(
-        self, found: BodyInference, binding: SkinBinding, options: SliderOptions, keep: str
+        self,
+        found: BodyInference,
+        binding: SkinBinding,
+        options: SliderOptions,
+        keep: str,
+        of: Indices,
     ) -> None:
+        """`of` are the bound vertices that the GLB's are."""
         self.found = found
         self.options = options
         self.keep = keep
+        self.of = of
         self.names = chosen(NAMES, options.parameters, found.model.name)
         if options.joint_names not in JOINT_NAMES or options.rest not in RESTS:
             raise InvalidRequest(
@@ -96,7 +104,7 @@ class _Rigged:
         if self.options.rest == "t_pose":
             turn = self.found.best.orientation
             linear = turn.maps_to_own(self.binding.linear(before, self.rest))
-            file = GlbFile(file.write(self._own(vertices), linear))
+            file = GlbFile(file.write(self._own(vertices)[self.of], linear[self.of]))
         deadline.check()
         offered = [self._slider(name) for name in self.names]
         asset = notes(self.found, self.keep, offered, self._further())
@@ -125,15 +133,18 @@ class _Rigged:
         """The morph targets of the shape: what an edit of each coefficient does at rest."""
         found = self.found
         for slider in shapes:
-            step = np.zeros(SHAPES)
-            step[NAMES.index(slider.name) - ANGLES] = 1.0
-            after = replace(self.rest, shape=self.rest.shape + step)
-            after = standing(found.model.template, self.rest, after, self.keep)
-            moved = self.binding.move(found.fit.body, after)
+            moved = self.binding.move(found.fit.body, self._shaped(slider.name))
             shift = (moved - vertices) * self.metres / found.fit.normalization.scale
             shift = found.best.orientation.to_own(shift)
             # What hardly turns anything is left out, as it is of edits.
-            yield from targets_of(slider, shift, Stretch({}), self.options.paired)
+            yield from targets_of(slider, shift[self.of], Stretch({}), self.options.paired)
+
+    def _shaped(self, name: str) -> Body:
+        """The body at rest with one more of a coefficient."""
+        step = np.zeros(SHAPES)
+        step[NAMES.index(name) - ANGLES] = 1.0
+        after = replace(self.rest, shape=self.rest.shape + step)
+        return standing(self.found.model.template, self.rest, after, self.keep)
 
     def _slider(self, name: str) -> Slider:
         found, index = self.found, NAMES.index(name)
@@ -187,21 +198,33 @@ class _Rigged:
     def _rig(self) -> Rig:
         skeleton = Skeleton.of_binding(self.found, self.binding, self.rest)
         names = JOINT_NAMES[self.options.joint_names]
+        apart = self._apart(skeleton)
         joints = [
             Joint(
                 name=names[index],
                 parent=PARENTS[index],
                 rotation=skeleton.rotations[index],
                 offset=skeleton.offsets[index] * self.metres,
-                extras=self._extras(index),
+                extras=self._extras(index, {name: row[index] for name, row in apart.items()}),
             )
             for index in range(len(JOINTS))
         ]
         # Both of points in metres and to points in metres.
         binds = skeleton.inverse_bind.copy()
         binds[:, :3, 3] *= self.metres
-        return Rig(joints, skeleton.frame, binds, skeleton.indices, skeleton.weights)
+        indices, weights = skeleton.indices[self.of], skeleton.weights[self.of]
+        return Rig(joints, skeleton.frame, binds, indices, weights)
 
-    def _extras(self, joint: int) -> dict[str, Any]:
+    def _apart(self, skeleton: Skeleton) -> dict[str, Array]:
+        """``[24, 3]`` metres that each offset changes by, for a unit of each coefficient."""
+        found = {}
+        for name in NAMES[ANGLES:]:
+            if name in self.names:
+                after = Skeleton.of_binding(self.found, self.binding, self._shaped(name))
+                found[name] = (after.offsets - skeleton.offsets) * self.metres
+        return found
+
+    def _extras(self, joint: int, apart: Mapping[str, Array]) -> dict[str, Any]:
         angles = [name for name in NAMES[3 * joint : 3 * joint + 3] if name in self.names]
-        return {"joint": JOINTS[joint], "parameters": angles}
+        shape = {name: offset.tolist() for name, offset in apart.items()}
+        return {"joint": JOINTS[joint], "parameters": angles, "shape": shape}

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import io
+import zipfile
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +15,7 @@ from service.edits import Change
 from service.encode.model import SHIPPED, Model, load_models
 from service.errors import InvalidRequest
 from service.mesh.convert import convert
+from service.mesh.embedding import as_glb
 from service.mesh.formats import read_mesh
 from service.requests import EditOptions, InferOptions, SliderOptions, Upload
 
@@ -90,6 +93,39 @@ def test_other_formats_and_units_come_in_metres(
     expected = 0.01 * edited(models, upload, values, options)
     found = read_mesh(weighted(data, values), "a.glb").vertices
     assert np.abs(found - expected).max() < 1e-5
+
+
+def painted(chair: trimesh.Trimesh) -> bytes:
+    """The chair, in centimetres, as an OBJ in a zip: flat quarters of texture, two materials."""
+    rows = ["mtllib chair.mtl", "vt 0 0", "vt 1 0", "vt 0 1"]
+    rows += ["v {:.6f} {:.6f} {:.6f}".format(*row) for row in 100 * chair.vertices]
+    rows += ["vn {} {} {}".format(*row) for row in chair.vertex_normals]
+    for number, face in enumerate(chair.faces + 1):
+        rows += [f"usemtl {'wood' if number % 40 else 'red'}"] if number % 20 == 0 else []
+        rows.append("f " + " ".join(f"{v}/{i}/{v}" for i, v in enumerate(face, 1)))
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr("chair.obj", "\n".join(rows))
+        file.writestr("chair.mtl", "newmtl wood\nKd 0.5 0.3 0.1\nnewmtl red\nKd 1 0 0\n")
+    return archive.getvalue()
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5])
+@pytest.mark.parametrize("paired", [False, True])
+def test_a_mesh_with_looks_does_what_an_edit_makes(
+    models: Mapping[str, Model], box_chair: trimesh.Trimesh, share: float, paired: bool
+) -> None:
+    upload = Upload(painted(box_chair.subdivide()), "chair.zip")
+    options = InferOptions(category="chair", units="cm")
+    data = pipeline.sliders(upload, models, options, SliderOptions(paired=paired))
+    assert [m["name"] for m in json_of(data)["materials"]] == ["red", "wood"]
+    mesh = read_mesh(upload.data, upload.name)
+    _, of = as_glb(mesh, 0.01)
+    assert len(of) > len(mesh.vertices)
+    values = somewhere(data, share)
+    expected = 0.01 * edited(models, upload, values, options)
+    found = read_mesh(weighted(data, values), "a.glb").vertices
+    assert np.abs(found - expected[of]).max() < 1e-5
 
 
 def test_what_is_told_is_what_is_inferred(models: Mapping[str, Model], upload: Upload) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -7,13 +8,17 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
-from weighted import json_of, turned, weighted
+from weighted import json_of, turned, weighted, with_json
 
 from service import pipeline
 from service.edits import Change
 from service.encode.model import SHIPPED, Model, load_models
 from service.errors import InvalidRequest
+from service.mesh.convert import convert
+from service.mesh.document import Document
+from service.mesh.embedding import as_glb
 from service.mesh.formats import read_mesh
+from service.mesh.scene import read_scene
 from service.requests import EditOptions, InferOptions, SliderOptions, Upload
 from service.template.anatomy import JOINTS
 from service.template.jointnames import JOINT_NAMES
@@ -82,15 +87,37 @@ def test_shape_morphs_do_what_an_edit_does(
     assert np.abs(gap).max() < tolerance
 
 
-def test_both_at_once_are_near_an_edit(
+def test_both_at_once_are_nearer_with_joints_that_move_apart(
     models: Mapping[str, Model], upload: Upload, rigged: bytes, found: Any
 ) -> None:
     shape = {"shape_0": found.parameter_report()["shape_0"]["value"] + 1}
     both = edited(models, upload, {**POSE, **shape})
-    gap = np.linalg.norm(vertices(weighted(turned(rigged, POSE), shape)) - both, axis=1)
-    moved = np.linalg.norm(both - vertices(upload.data), axis=1)
-    # The joints stay where they are while the shape changes.
-    assert gap.mean() < 0.15 * moved.mean()
+    moved = np.linalg.norm(both - vertices(upload.data), axis=1).mean()
+    alone = vertices(weighted(turned(rigged, POSE), shape))
+    assert np.linalg.norm(alone - both, axis=1).mean() < 0.15 * moved
+    apart = vertices(weighted(turned(spread(rigged, {"shape_0": 1.0}), POSE), shape))
+    assert np.linalg.norm(apart - both, axis=1).mean() < 0.01 * moved
+
+
+def spread(data: bytes, steps: Mapping[str, float]) -> bytes:
+    """The GLB with its joints where a changed shape has them, and its mesh bound to them there."""
+    root = json_of(data)
+    (skin,) = root["skins"]
+    worlds = []
+    for apart in (False, True):
+        if apart:
+            for node in root["nodes"]:
+                for name, offset in node.get("extras", {}).get("shape", {}).items():
+                    step = steps.get(name, 0.0) * np.array(offset)
+                    node["translation"] = (np.array(node["translation"]) + step).tolist()
+        worlds.append(read_scene(Document("gltf", json.dumps(root).encode())).worlds)
+    view = root["bufferViews"][root["accessors"][skin["inverseBindMatrices"]]["bufferView"]]
+    content = bytearray(with_json(data, root))
+    start = len(content) - len(data) + data.index(b"BIN\0") + 4 + view["byteOffset"]
+    binds = np.ndarray((24, 4, 4), "<f4", content, start).swapaxes(1, 2)
+    for bind, joint in zip(binds, skin["joints"], strict=True):
+        bind[:] = np.linalg.inv(worlds[1][joint]) @ worlds[0][joint] @ bind
+    return bytes(content)
 
 
 @pytest.mark.parametrize("whose", ["smpl", "mixamo", "vrm"])
@@ -175,3 +202,27 @@ def test_unknown_rigs(models: Mapping[str, Model], upload: Upload, option: dict[
     with pytest.raises(InvalidRequest) as error:
         pipeline.sliders(upload, models, OPTIONS, SliderOptions(**option))
     assert error.value.code == "unknown_rig"
+
+
+@pytest.mark.parametrize("rest", ["upload", "t_pose"])
+def test_vertices_that_looks_part_move_together(
+    models: Mapping[str, Model], human: SkinnedTemplate, strider: Body, rest: str
+) -> None:
+    mesh = trimesh.Trimesh(human.decode(strider), human.faces, process=False)
+    rows = ["v {} {} {}".format(*row) for row in mesh.vertices]
+    rows += ["vn {} {} {}".format(*row) for row in mesh.vertex_normals]
+    rows += ["vt 0 0", "vt 1 0", "vt 0 1"]
+    for face in mesh.faces + 1:
+        rows.append("f " + " ".join(f"{v}/{i}/{v}" for i, v in enumerate(face, 1)))
+    painted = Upload("\n".join(rows).encode(), "body.obj")
+    bare = Upload(convert(mesh.vertices, mesh.faces, "obj"), "body.obj")
+    _, of = as_glb(read_mesh(painted.data, painted.name), 1.0)
+    assert len(of) > len(mesh.vertices)
+    options = SliderOptions(rest=rest)
+    found, expected = (pipeline.sliders(file, models, OPTIONS, options) for file in (painted, bare))
+    now = json_of(expected)["asset"]["extras"]["shape_parameters"]["parameters"]["shape_1"]
+    shape = {"shape_1": now["value"] + 1}
+    for posed in (POSE, {}):
+        gap = vertices(weighted(turned(found, posed), shape))
+        gap = gap - vertices(weighted(turned(expected, posed), shape))[of]
+        assert np.abs(gap).max() < 1e-4

@@ -38,7 +38,8 @@ def _answers(description: str) -> dict[int | str, dict[str, Any]]:
     summary="Put a mesh's parameters into it, as sliders",
     description="Answers a GLB of the upload that any glTF viewer edits with no further request: "
     "one morph target a parameter for rigid categories, a skeleton and shape morphs for bodies. "
-    "Materials, textures and nodes stay; other formats come as bare geometry, in metres.\n\n"
+    "Materials, textures and nodes stay; other formats come in metres, with their colours, normals "
+    "and texture coordinates, and an OBJ in a zip with its materials and pictures.\n\n"
     "    curl -F mesh=@chair.glb http://127.0.0.1:8000/sliders -OJ\n\n"
     "Each mesh's `extras.targetNames` names its targets, and `extras.targets` says of each which "
     "`parameter` it is, its `label`, `unit`, `value`, `range`, and the `change` that a weight of 1 "

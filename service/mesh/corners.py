@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from service.mesh import limits
 from service.mesh.faults import malformed
 from service.mesh.polygons import Indices
-from service.mesh.textlines import SPACE, Bytes, TextLines, numbers
+from service.mesh.textlines import SPACE, Bytes, TextLines, Tokens, numbers
 
 SLASH = ord("/")
-POSITION, NORMAL = 0, 2
+POSITION, TEXTURE, NORMAL = 0, 1, 2
 
 
 class Corners:
@@ -21,38 +21,45 @@ class Corners:
 
     Attributes:
         counts: ``[P]`` corners of each face.
+        lines: ``[P]`` the line of each.
     """
 
     def __init__(self, lines: TextLines) -> None:
         """Parse the ``f`` lines; InvalidMesh where one holds anything but corners."""
-        self._lines, at = lines.beginning(b"f")
-        tokens = lines.tokens(self._lines, at)
+        self.lines, at = lines.beginning(b"f")
+        tokens = lines.tokens(self.lines, at)
         self.counts: Indices = tokens.counts
         limits.check_faces(int(np.maximum(self.counts - 2, 0).sum()))
+        self._mixed: Tokens | None = None
         self._fields: dict[int, NDArray[Any]] = uniform_fields(tokens.text, tokens.edges)
         if not self._fields:
-            self._fields = {
-                field: mixed_field(tokens.text, tokens.edges, field) for field in (POSITION, NORMAL)
-            }
+            self._mixed = tokens
+            self._parse(POSITION)
+            self._parse(NORMAL)
+
+    def _parse(self, field: int) -> None:
+        if self._mixed is not None and field not in self._fields:
+            self._fields[field] = mixed_field(self._mixed.text, self._mixed.edges, field)
 
     def indices(self, field: int, targets: Indices) -> Indices:
         """``[C]`` zero-based indices of each corner; -1 where it has no such field.
 
         Args:
-            field: `POSITION` or `NORMAL`.
+            field: `POSITION`, `TEXTURE` or `NORMAL`.
             targets: ``[N]`` line numbers of what is counted: negative indices count back from
                 the face's line.
 
         Raises:
-            InvalidMesh: an index is 0, or counts back too far.
+            InvalidMesh: an index is 0, or counts back too far; or, of `TEXTURE`, is none.
         """
+        self._parse(field)
         found = self._fields.get(field)
         if found is None:
             return np.full(self.counts.sum(), -1)
         given = found != MISSING
         if len(found) == 0 or found.min() > 0:
             return np.where(given, found - 1, -1)
-        line = np.repeat(self._lines, self.counts)
+        line = np.repeat(self.lines, self.counts)
         absolute = np.where(found < 0, np.searchsorted(targets, line) + found, found - 1)
         wrong = given & (absolute < 0)
         if wrong.any():

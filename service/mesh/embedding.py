@@ -1,39 +1,80 @@
-"""Any mesh as one GLB: what came beside a glTF is put into it, bare geometry is wrapped."""
+"""Any mesh as one GLB: what came beside a glTF is put into it, other formats with their looks."""
 
 from __future__ import annotations
 
 import base64
 import binascii
 import copy
+import logging
 import mimetypes
 from typing import Any
+
+import numpy as np
 
 from service.errors import ShapeError
 from service.mesh.convert import convert
 from service.mesh.document import Object
+from service.mesh.folder import Folder
 from service.mesh.glb import BIN, HEADER, JSON, GlbFile, packed
 from service.mesh.gltf import GltfFile
 from service.mesh.jsontext import dump
+from service.mesh.looks import Looks
 from service.mesh.meshcopies import objects
 from service.mesh.meshfile import MeshFile
+from service.mesh.obj import ObjFile
+from service.mesh.objlooks import obj_looks
+from service.mesh.off import OffFile
+from service.mesh.ply import PlyFile
+from service.mesh.pointlooks import off_looks, ply_looks
+from service.mesh.polygons import Indices
+from service.mesh.wrapping import wrap
 from service.mesh.zipped import ZippedFile
 
 ALIGNMENT = 4
+LOGGER = logging.getLogger(__name__)
 
 
-def as_glb(mesh: MeshFile, metres: float) -> GlbFile:
-    """The mesh as a GLB that needs no other file, vertices in the same order.
+def as_glb(mesh: MeshFile, metres: float) -> tuple[GlbFile, Indices]:
+    """The mesh as a GLB that needs no other file, and which of its vertices each of the GLB's is.
 
     Args:
         mesh: of any format.
         metres: per unit of the file, which a GLB is measured in; of glTF, 1.
+
+    Returns:
+        The GLB, and ``[W]`` indices: all in order, but for an OBJ with a vertex that looks
+        different in different faces.  Looks that are broken or missing are left out.
     """
     inner = mesh.inner if isinstance(mesh, ZippedFile) else mesh
+    same = np.arange(len(inner.vertices))
     if isinstance(inner, GlbFile) and _is_whole(inner):
-        return inner
+        return inner, same
     if isinstance(inner, GltfFile):
-        return GlbFile(_embedded(inner))
-    return GlbFile(convert(inner.vertices * metres, inner.faces, "glb"))
+        return GlbFile(_embedded(inner)), same
+    vertices = inner.vertices * metres
+    folder = mesh.folder if isinstance(mesh, ZippedFile) else None
+    try:
+        with np.errstate(all="ignore"):
+            looks = _looks(inner, folder)
+            if looks is not None:
+                return GlbFile(wrap(vertices, looks, folder)), looks.of
+    except ShapeError:
+        raise
+    except Exception:
+        # What damaged bytes can still provoke behind the checks: a shape needs no looks.
+        LOGGER.exception("a mesh's looks were left out")
+    return GlbFile(convert(vertices, inner.faces, "glb")), same
+
+
+def _looks(mesh: MeshFile, folder: Folder | None) -> Looks | None:
+    match mesh:
+        case ObjFile():
+            return obj_looks(mesh, folder)
+        case PlyFile():
+            return ply_looks(mesh, folder)
+        case OffFile():
+            return off_looks(mesh)
+    return None
 
 
 def _is_whole(file: GlbFile) -> bool:

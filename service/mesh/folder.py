@@ -1,11 +1,13 @@
-"""The folder of an archive that a glTF file's references start from.  Nothing else is reachable."""
+"""The folder of an archive that a file's references start from.  Nothing else is reachable."""
 
 from __future__ import annotations
 
+from collections import defaultdict
+from functools import cached_property
 from pathlib import PurePosixPath
 from urllib.parse import unquote
 
-from service.errors import InvalidMesh
+from service.errors import InvalidMesh, ShapeError
 from service.mesh.archive import Archive
 from service.mesh.faults import quoted, unsupported
 
@@ -46,3 +48,39 @@ class Folder:
     def read(self, name: str) -> bytes:
         """The content of a member that `locate` found."""
         return self._archive.read(name)
+
+    def find(self, path: str) -> str | None:
+        """The member that `path`, as another machine wrote it, must mean; None where none must.
+
+        Programs write paths of the disk that they ran on, and names in letters of any case: where
+        nothing is there as it is written, the only file of that name is meant.
+        """
+        if "\0" in path or not path.strip():
+            return None
+        try:
+            return self.locate(path)
+        except ShapeError:
+            name = path.replace("\\", "/").rpartition("/")[2]
+            for known in (name, unquote(name)):
+                if len(found := self._by_name.get(known.casefold(), [])) == 1:
+                    return found[0]
+            return None
+
+    def content(self, name: str, largest: int) -> bytes | None:
+        """A member's content; None where it is larger, or can't be read."""
+        if self._archive.members[name].size > largest:
+            return None
+        try:
+            return self.read(name)
+        except ShapeError:
+            return None
+
+    @cached_property
+    def _by_name(self) -> dict[str, list[str]]:
+        """The members in this folder and below by the names of their files, in lower case."""
+        found: dict[str, list[str]] = defaultdict(list)
+        for member in self._archive.members:
+            path = PurePosixPath(member)
+            if path.is_relative_to(self._path) and ".." not in path.parts:
+                found[path.name.casefold()].append(member)
+        return found

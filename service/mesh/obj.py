@@ -20,7 +20,15 @@ from service.mesh.triples import Triples
 
 
 class ObjFile(MeshFile):
-    """An OBJ file."""
+    """An OBJ file.
+
+    Attributes:
+        lines: of the text.
+        vertex_lines: ``[V]`` where each vertex is.
+        corners: of the faces.
+        corner_vertices, corner_normals: ``[C]`` what each of them uses; -1 without a normal.
+        normals: ``[N, 3]``.
+    """
 
     format = "obj"
     media_type = "model/obj"
@@ -28,22 +36,24 @@ class ObjFile(MeshFile):
     def __init__(self, data: bytes) -> None:
         """Read `data`; InvalidMesh when that can't be."""
         self.data = data
-        lines = TextLines("obj", data, continued=True)
+        self.lines = lines = TextLines("obj", data, continued=True)
         _refuse_free_form(lines)
         self._positions = Triples(lines, b"v")
+        self.vertex_lines = self._positions.lines
         self._normals = Triples(lines, b"vn")
-        corners = Corners(lines)
-        self._corner_vertices = corners.indices(POSITION, self._positions.lines)
-        self._corner_normals = corners.indices(NORMAL, self._normals.lines)
-        count, used = len(self._positions.lines), self._corner_vertices
+        self.normals = self._normals.values
+        self.corners = Corners(lines)
+        self.corner_vertices = self.corners.indices(POSITION, self._positions.lines)
+        self.corner_normals = self.corners.indices(NORMAL, self._normals.lines)
+        count, used = len(self._positions.lines), self.corner_vertices
         # Of every face, also those of too few corners to be a triangle.
         wrong = used[(used < 0) | (used >= count)]
         if count and len(wrong):
             raise face_out_of_range(int(wrong[0]), count)
-        if self._corner_normals.max(initial=-1) >= len(self._normals.lines):
+        if self.corner_normals.max(initial=-1) >= len(self._normals.lines):
             raise malformed("obj", "a face uses a normal that isn't there")
         self.vertices = self._positions.values
-        self.faces = fan(self._corner_vertices, corners.counts)
+        self.faces = fan(self.corner_vertices, self.corners.counts)
 
     @moves.tolerant
     def write(self, vertices: Vertices, linear: Linear) -> bytes:
@@ -60,10 +70,10 @@ class ObjFile(MeshFile):
 
         A normal that several vertices use takes the mean of what their maps make of it.
         """
-        values = self._normals.values
+        values = self.normals
         turned = np.zeros(len(values), bool)
-        used = self._corner_normals >= 0
-        vertex, normal = self._corner_vertices[used], self._corner_normals[used]
+        used = self.corner_normals >= 0
+        vertex, normal = self.corner_vertices[used], self.corner_normals[used]
         turned[normal[change.turned[vertex]]] = True
         affected = turned[normal]
         pairs = np.unique(normal[affected] * len(self.vertices) + vertex[affected])

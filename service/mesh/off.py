@@ -21,7 +21,12 @@ COUNT = re.compile(rb"[0-9]{1,12}")
 
 
 class OffFile(MeshFile):
-    """An OFF file."""
+    """An OFF file.
+
+    Attributes:
+        letters: what its keyword says that vertices have: "ST", "C" and "N" in a row.
+        width: numbers that every vertex has.
+    """
 
     format = "off"
     media_type = "model/vnd.off"
@@ -31,19 +36,25 @@ class OffFile(MeshFile):
         self.data = data
         lines = TextLines("off", data)
         filled = lines.filled()
-        self._has_normals, counts, used = _header(lines, filled)
+        self.letters, counts, used = _header(lines, filled)
         vertex_lines = filled[used : used + counts[0]]
         face_lines = filled[used + counts[0] : used + sum(counts)]
         if len(vertex_lines) + len(face_lines) < sum(counts):
             raise malformed("off", f"it ends before its {counts[0]} vertices and {counts[1]} faces")
         self._tokens = lines.tokens(vertex_lines)
+        self._has_normals = "N" in self.letters
         width = 6 if self._has_normals else 3
-        if counts[0] and self._tokens.counts.min() < width:
+        self.width = int(self._tokens.counts.min()) if counts[0] else width
+        if self.width < width:
             line = vertex_lines[int(np.argmin(self._tokens.counts))] + 1
             raise malformed("off", f"line {line} has fewer than {width} numbers")
         self._values = self._tokens.numbers()
-        self.vertices = self._values[self._columns(0)]
+        self.vertices = self.columns(0, 3)
         self.faces = _faces(lines.tokens(face_lines))
+
+    def columns(self, start: int, count: int) -> Vertices:
+        """``[V, count]`` numbers of the vertices, some of their `width`."""
+        return self._values[self._tokens.first[:, None] + np.arange(start, start + count)]
 
     def _columns(self, start: int) -> Indices:
         """``[V, 3]`` token numbers of three columns."""
@@ -70,11 +81,11 @@ class OffFile(MeshFile):
         return Replacement(starts, ends, self._values[flat], values.reshape(-1))
 
 
-def _header(lines: TextLines, filled: Indices) -> tuple[bool, tuple[int, int], int]:
-    """Whether vertices have normals; the counts of vertices and faces; lines used for that."""
+def _header(lines: TextLines, filled: Indices) -> tuple[str, tuple[int, int], int]:
+    """The letters of what vertices have; the counts of vertices and faces; lines used for that."""
     words: list[bytes] = []
     used = 0
-    normals = False
+    letters = ""
     for line in filled[:2].tolist():
         text = lines.data[lines.starts[line] : lines.ends[line]].partition(b"#")[0]
         used += 1
@@ -86,7 +97,7 @@ def _header(lines: TextLines, filled: Indices) -> tuple[bool, tuple[int, int], i
                     f"The file is of the OFF variant {quoted(text.decode('latin-1').strip())}",
                     "Export it as OFF in ASCII with three coordinates",
                 )
-            normals = keyword[3] is not None
+            letters = b"".join(part for part in keyword.groups() if part).decode()
             # Some writers put the counts right behind the keyword, even without a blank.
             text = text[keyword.end() :]
         words += text.split()
@@ -94,7 +105,7 @@ def _header(lines: TextLines, filled: Indices) -> tuple[bool, tuple[int, int], i
             break
     if len(words) < 2 or not all(COUNT.fullmatch(word) for word in words[:2]):
         raise malformed("off", "it does not begin with OFF and the numbers of vertices and faces")
-    return normals, (int(words[0]), int(words[1])), used
+    return letters, (int(words[0]), int(words[1])), used
 
 
 def _faces(tokens: Tokens) -> Faces:

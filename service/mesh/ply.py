@@ -5,6 +5,8 @@ Only the properties x, y, z and nx, ny, nz of moved vertices change.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from service.mesh import limits, moves
@@ -35,7 +37,7 @@ class PlyFile(MeshFile):
         self._edges: Indices | None = None
         elements = _read_elements(self.header, *self._body())
         self.rows = _vertex_rows(self.header, elements)
-        self.vertices = self._columns(POSITION)
+        self.vertices = self.columns(POSITION)
         self.faces = _faces(elements)
 
     def _body(self) -> tuple[memoryview, int]:
@@ -47,7 +49,8 @@ class PlyFile(MeshFile):
         parsed = parse_numbers("ply", text, len(self._edges) // 2, np.float64)
         return memoryview(parsed.tobytes()), 0
 
-    def _columns(self, names: tuple[str, str, str]) -> Vertices:
+    def columns(self, names: Sequence[str]) -> Vertices:
+        """``[V, C]`` scalar properties of the vertices."""
         columns = [self.rows.scalars[name] for name in names]
         return np.stack(columns, axis=1).astype(np.float64)
 
@@ -61,7 +64,7 @@ class PlyFile(MeshFile):
             columns |= {n: (rows, vertices[rows, i]) for i, n in enumerate(POSITION)}
         if change.turned.any() and all(name in self.rows.scalars for name in NORMAL):
             rows = np.flatnonzero(change.turned)
-            turned = moves.turn_normals(self._columns(NORMAL)[rows], linear[rows])
+            turned = moves.turn_normals(self.columns(NORMAL)[rows], linear[rows])
             columns |= {n: (rows, turned[:, i]) for i, n in enumerate(NORMAL)}
         if not columns:
             return self.data

@@ -21,6 +21,7 @@ class ZippedFile(MeshFile):
 
     Attributes:
         inner: that mesh.
+        folder: it is in.
     """
 
     media_type = "application/zip"
@@ -36,8 +37,9 @@ class ZippedFile(MeshFile):
         self._archive = Archive(data)
         self._member = mesh_member(list(self._archive.members), readers)
         reader, content = readers[_suffix(self._member)], self._archive.read(self._member)
+        self.folder = Folder(self._archive, self._member)
         if issubclass(reader, GltfFile):
-            self.inner: MeshFile = reader(content, Folder(self._archive, self._member))
+            self.inner: MeshFile = reader(content, self.folder)
         else:
             self.inner = reader(content)
         self.format = self.inner.format

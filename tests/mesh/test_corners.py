@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from service.errors import InvalidMesh, TooLarge
 from service.mesh import limits
-from service.mesh.corners import NORMAL, POSITION, Corners
+from service.mesh.corners import NORMAL, POSITION, TEXTURE, Corners
 from service.mesh.textlines import TextLines
 
 
@@ -91,3 +91,25 @@ def test_polygons_without_end_are_refused(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(limits, "FACES", 2)
     with pytest.raises(TooLarge, match="too_many_faces"):
         Corners(lines)
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (b"f 1/2/3 4/5/6 7/-1/9", [1, 4, 1]),
+        (b"f 1/2 4//6 7", [1, -1, -1]),
+        (b"f 1//3 4//6 7//9", [-1] * 3),
+        (b"f 1 2 3", [-1] * 3),
+    ],
+)
+def test_texture_coordinates(data: bytes, expected: list[int]) -> None:
+    lines = TextLines("obj", b"vt 0 0\nvt 0 0\n" + data)
+    corners = Corners(lines)
+    assert corners.indices(TEXTURE, lines.beginning(b"vt")[0]).tolist() == expected
+
+
+def test_other_text_is_no_texture_coordinate() -> None:
+    corners = Corners(TextLines("obj", b"f 1/x/3 4//6 7"))
+    assert corners.counts.tolist() == [3]
+    with pytest.raises(InvalidMesh):
+        corners.indices(TEXTURE, np.empty(0, np.int64))

@@ -11,6 +11,7 @@ import pytest
 from gltf_assets import Asset, unpack
 from mesh_samples import asset, ball, glb, gltf, obj, off, ply, stl
 
+from service.mesh import embedding
 from service.mesh.embedding import as_glb
 from service.mesh.formats import read_mesh
 
@@ -38,7 +39,7 @@ def split(pictured: bool = True) -> tuple[dict[str, Any], dict[str, bytes]]:
 
 def test_a_whole_glb_is_itself() -> None:
     mesh = read_mesh(glb(), "a.glb")
-    assert as_glb(mesh, 1.0) is mesh
+    assert as_glb(mesh, 1.0)[0] is mesh
 
 
 @pytest.mark.parametrize(
@@ -52,15 +53,27 @@ def test_a_whole_glb_is_itself() -> None:
 def test_vertices_stay_in_order(name: str, data: bytes, metres: float) -> None:
     mesh = read_mesh(data, name)
     factor = 1.0 if mesh.format == "gltf" else metres
-    result = as_glb(mesh, metres)
+    result, of = as_glb(mesh, metres)
     assert np.allclose(result.vertices, factor * mesh.vertices, rtol=1e-6, atol=1e-9)
     assert np.array_equal(result.faces, mesh.faces)
+    assert np.array_equal(of, np.arange(len(mesh.vertices)))
+
+
+def test_what_only_the_looks_break_is_answered_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise IndexError
+
+    monkeypatch.setattr(embedding, "obj_looks", fail)
+    mesh = read_mesh(obj(), "a.obj")
+    result, of = as_glb(mesh, 1.0)
+    assert np.array_equal(result.faces, mesh.faces)
+    assert len(of) == len(result.vertices)
 
 
 def test_what_lies_beside_is_put_into_it() -> None:
     root, files = split()
     mesh = read_mesh(zipped({"ball.gltf": json.dumps(root).encode(), **files}), "a.zip")
-    result = as_glb(mesh, 1.0)
+    result, _ = as_glb(mesh, 1.0)
     told, _, chunk = unpack(result.data)
     assert np.array_equal(result.vertices, mesh.vertices)
     (image,) = told["images"]
@@ -80,7 +93,7 @@ def test_pictures_in_the_json_move_to_the_chunk() -> None:
         {"uri": "data:image/png;base64,!"},
         {"uri": "elsewhere.png"},
     ]
-    result = as_glb(read_mesh(json.dumps(root).encode(), "a.gltf"), 1.0)
+    result, _ = as_glb(read_mesh(json.dumps(root).encode(), "a.gltf"), 1.0)
     first, *others = unpack(result.data)[0]["images"]
     assert first["mimeType"] == "image/png"
     assert others == root["images"][1:]
@@ -95,6 +108,6 @@ def test_several_buffers_become_one() -> None:
     root["accessors"][position]["bufferView"] = len(root["bufferViews"]) - 1
     more = (2 * vertices).astype("<f4").tobytes()
     data = zipped({"ball.gltf": json.dumps(root).encode(), "more.bin": more, **files})
-    result = as_glb(read_mesh(data, "a.zip"), 1.0)
+    result, _ = as_glb(read_mesh(data, "a.zip"), 1.0)
     assert np.allclose(result.vertices, 2 * vertices)
     assert len(unpack(result.data)[0]["buffers"]) == 1

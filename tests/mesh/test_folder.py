@@ -55,3 +55,31 @@ def test_what_is_not_there_is_named(uri: str) -> None:
         FOLDER.locate(uri)
     assert caught.value.code == "missing_buffer"
     assert uri in caught.value.detail
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("b c/d.bin", "a/b c/d.bin"),
+        ("C:\\work\\D.BIN", "a/b c/d.bin"),
+        ("../x/Scene.bin", "a/scene.bin"),
+        ("/abs/b%20c/50%25.bin", "a/50%.bin"),
+        ("top.bin", None),
+        ("../top.bin", None),
+        ("..", None),
+        ("", None),
+        (" ", None),
+        ("scene.bin\0", None),
+    ],
+)
+def test_what_another_machine_wrote_is_found_by_its_name(path: str, name: str | None) -> None:
+    assert FOLDER.find(path) == name
+
+
+def test_a_name_that_is_there_twice_means_neither() -> None:
+    files = {"a.obj": b"", "x/t.png": b"1", "y/T.png": b"2"}
+    folder = Folder(Archive(zipped(files)), "a.obj")
+    assert folder.find("z/t.png") is None
+    assert folder.find("y/T.png") == "y/T.png"
+    assert folder.content("y/T.png", 1) == b"2"
+    assert folder.content("y/T.png", 0) is None

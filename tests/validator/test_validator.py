@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shutil
 import subprocess
+import zipfile
 from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 
 import pytest
 import trimesh
+from PIL import Image
 from weighted import json_of, with_json
 
 from service import pipeline
@@ -44,6 +47,24 @@ def models() -> Mapping[str, Model]:
     return load_models(SHIPPED)
 
 
+def with_looks(chair: trimesh.Trimesh) -> Upload:
+    """The chair as an OBJ of two materials, with a picture, in a zip."""
+    picture, archive = io.BytesIO(), io.BytesIO()
+    Image.new("RGB", (4, 4), "brown").save(picture, "PNG")
+    rows = ["mtllib chair.mtl", "vt 0 0", "vt 1 0", "vt 0 1", "usemtl wood"]
+    rows += ["v {} {} {}".format(*row) for row in chair.vertices]
+    rows += ["vn {} {} {}".format(*row) for row in chair.vertex_normals]
+    for number, face in enumerate(chair.faces + 1):
+        rows += ["usemtl leather"] if number == len(chair.faces) // 2 else []
+        rows.append("f " + " ".join(f"{v}/{i}/{v}" for i, v in enumerate(face, 1)))
+    wood = "newmtl wood\nmap_Kd -s 2 2 wood.png\nPr 0.5\n"
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr("chair.obj", "\n".join(rows))
+        file.writestr("chair.mtl", wood + "newmtl leather\nKd 0.1 0 0\nd 0.5\nKe 0 0 1\nNs 9\n")
+        file.writestr("wood.png", picture.getvalue())
+    return Upload(archive.getvalue(), "chair.zip")
+
+
 def outputs(
     models: Mapping[str, Model], chair: trimesh.Trimesh, body: trimesh.Trimesh
 ) -> dict[str, bytes]:
@@ -56,6 +77,7 @@ def outputs(
         "glb": Upload(smooth.export(file_type="glb"), "chair.glb"),
         "obj": Upload(convert(chair.vertices, chair.faces, "obj"), "chair.obj"),
         "gltf": Upload(convert(chair.vertices, chair.faces, "gltf"), "chair.gltf"),
+        "looks": with_looks(smooth),
     }
     for (name, upload), paired, quantize in product(chairs.items(), *[(False, True)] * 2):
         options = SliderOptions(paired=paired, quantize=quantize)
