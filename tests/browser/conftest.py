@@ -19,8 +19,9 @@ PICTURES = Path(os.environ.get("SCREENSHOTS", Path(__file__).parents[2] / "artif
 expect.set_options(timeout=PATIENCE)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
+    """Chromium; it is closed after each module, since an event loop runs as long as it is open."""
     path = chromium()
     if path is None:
         pytest.skip("no Chromium is installed: apt-get install chromium, or name one by CHROMIUM")
@@ -35,7 +36,7 @@ def url(service_client: httpx.Client) -> str:
     return str(service_client.base_url)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def contexts(browser: Browser) -> Callable[..., BrowserContext]:
     """Contexts by their settings: pages of one share what they hold of the service's files."""
     made: dict[str, BrowserContext] = {}
@@ -92,7 +93,7 @@ def visit(contexts: Callable[..., BrowserContext], url: str) -> Iterator[Visit]:
     watch.check()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def _kept(contexts: Callable[..., BrowserContext], url: str) -> tuple[Page, Watch]:
     """One page for many tests: software takes seconds to get WebGL going."""
     watch = Watch()

@@ -1,10 +1,10 @@
 from __future__ import annotations
 
+from importlib import resources
 from pathlib import Path
 
 import pytest
 
-import model_export
 from model_export.bodyconfig import BodyConfig, load_body_config
 
 
@@ -20,7 +20,8 @@ def test_settings_come_from_a_file(tmp_path: Path) -> None:
 
 
 def test_a_body_can_be_trained_on_a_cpu() -> None:
-    config = load_body_config(Path(model_export.__file__).parent / "configs" / "human-cpu.yaml")
+    with resources.as_file(resources.files("model_export.configs") / "human-cpu.yaml") as path:
+        config = load_body_config(path)
     shipped = BodyConfig()
     assert config.steps * config.batch < 0.2 * shipped.steps * shipped.batch
     assert (config.width, config.depth) == (shipped.width, shipped.depth)
