@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import onnx
 import torch
 from torch import Tensor, nn
 
@@ -37,3 +38,14 @@ def write_network(
             external_data=False,
             verbose=False,
         )
+    _write_plain(path)
+
+
+def _write_plain(path: Path) -> None:
+    """Leave out what the exporter notes of its own: traces with the paths of this machine."""
+    model = onnx.load(path)
+    graph = model.graph
+    noted = [model, graph, *graph.node, *graph.input, *graph.output, *graph.value_info]
+    for entry in [*noted, *graph.initializer, *model.functions]:
+        entry.ClearField("metadata_props")
+    onnx.save(model, path)

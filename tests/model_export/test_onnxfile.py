@@ -23,3 +23,11 @@ def test_a_written_network_answers_like_the_one_in_memory(tmp_path: Path) -> Non
         with torch.no_grad():
             np.testing.assert_allclose(found, network(cloud).numpy(), atol=1e-6)
     assert not (tmp_path / "small.onnx.data").exists()
+
+
+def test_a_file_tells_nothing_of_the_machine_that_wrote_it(tmp_path: Path) -> None:
+    path = tmp_path / "small.onnx"
+    write_network(nn.Sequential(nn.Linear(3, 4), nn.ReLU()), torch.zeros(2, 3), path, ("a", "b"))
+    content = path.read_bytes()
+    assert b".py" not in content
+    assert str(Path(torch.__file__).parent).encode() not in content
