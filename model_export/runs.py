@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ LOOK = 20
 SMOOTH = 0.02
 
 
-class Run:
+class Run(ABC):
     """A training run: a number of steps, or all that fit into a time.
 
     Attributes:
@@ -54,13 +55,13 @@ class Run:
             return f"one {torch.cuda.get_device_name(self.device)}"
         return f"CPU, threads: {torch.get_num_threads()}"
 
+    @abstractmethod
     def train_step(self) -> dict[str, Tensor]:
         """One optimiser step; the terms of the loss, always the same ones."""
-        raise NotImplementedError
 
+    @abstractmethod
     def state(self) -> dict[str, Any]:
         """Everything that it takes to go on, as plain values and tensors."""
-        raise NotImplementedError
 
 
 def seed_of(*numbers: int) -> int:

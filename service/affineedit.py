@@ -17,7 +17,6 @@ from service.deform.binding import Binding
 from service.deform.demands import Unsatisfiable
 from service.deform.dimensions import Dimensions
 from service.deform.followers import following
-from service.deform.measured import find_levels
 from service.deform.outcome import Outcome
 from service.deform.readings import APART
 from service.deform.unfold import unfold
@@ -52,16 +51,13 @@ def move(
     """
     fit = found.fit
     binding = bind(found, options.mode)
-    levels = find_levels(
-        found.vertices, found.mesh.faces, fit.template, fit.parameters, fit.translation
-    )
     deadline.check()
     try:
-        first = found.dimensions(binding.jacobian, levels).outcome(edits, constraints=constraints)
+        first = found.dimensions(binding.jacobian).outcome(edits, constraints=constraints)
         if options.mode == "blend":
             changed = np.flatnonzero(first.change).tolist()
             binding = unfold(binding, found.vertices, found.mesh.faces, fit.parameters, changed)
-        dimensions = found.dimensions(binding.jacobian, levels)
+        dimensions = found.dimensions(binding.jacobian)
         outcome = dimensions.outcome(edits, options.strict, constraints)
     except Unsatisfiable as conflict:
         raise conflict_error(conflict, lambda _: found.unit) from conflict

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from service.deform.dimensions import Dimensions
-from service.deform.measured import Level
+from service.deform.measured import Level, find_levels
 from service.encode.affinemodel import AffineModel
 from service.encode.estimate import Estimate
 from service.inference import Inference
@@ -42,15 +43,25 @@ class AffineInference(Inference):
         """``[d]`` in the reported unit."""
         return self.fit.parameters / self.scale
 
-    def dimensions(
-        self,
-        jacobian: NDArray[np.floating] | None = None,
-        levels: Mapping[str, Level] | None = None,
-    ) -> Dimensions:
-        """The mesh's dimensions in the reported unit; with a Jacobian, as they can be changed, and
-        with levels, as the mesh itself has them."""
-        template = self.fit.template
-        return Dimensions(template, self.parameters, self.vertices, self.scale, jacobian, levels)
+    @cached_property
+    def levels(self) -> Mapping[str, Level]:
+        """Where derived dimensions are measured on the mesh itself."""
+        fit = self.fit
+        return find_levels(
+            self.vertices, self.mesh.faces, fit.template, fit.parameters, fit.translation
+        )
+
+    def dimensions(self, jacobian: NDArray[np.floating] | None = None) -> Dimensions:
+        """The mesh's dimensions in the reported unit; with a Jacobian, as the mesh itself has them
+        and as they can be changed."""
+        return Dimensions(
+            self.fit.template,
+            self.parameters,
+            self.vertices,
+            self.scale,
+            jacobian,
+            None if jacobian is None else self.levels,
+        )
 
     def parameter_report(self) -> dict[str, dict[str, Any]]:
         template = self.model.template

@@ -14,7 +14,6 @@ from service.affineinference import AffineInference
 from service.deform.admissible import LEAST, Bounds
 from service.deform.binding import Binding
 from service.deform.followers import following
-from service.deform.measured import find_levels
 from service.deform.unfold import unfold
 from service.mesh.convert import convert
 from service.mesh.embedding import as_glb
@@ -85,42 +84,30 @@ def _with_targets(
     keep: str,
     measured: Mapping[str, Plane],
 ) -> bytes:
-    offered = [_slider(found, name) for name in names]
+    offered = _sliders(found, names)
     targets = _targets(found, shown, binding, offered, options.paired, keep)
     asset = notes(found, keep, offered, _further(found, names, measured))
     return add_targets(shown[0], targets, asset, options.quantize)
 
 
-def _slider(found: AffineInference, name: str) -> Slider:
-    template = found.model.template
-    index = template.names.index(name)
-    entry = next(entry for entry in found.model.entries() if entry["name"] == name)
-    value, metre = float(found.parameters[index]), UNITS[found.unit]
-    low, high = (end / metre for end in entry["typical"])
-    ends = size_range(value, (low, high))
-    reach = [_within(_bounds(found), found.parameters, index, end) for end in ends]
-    return Slider(
-        name=name,
-        label=entry["label"],
-        group=entry["group"],
-        unit=found.unit,
-        kind=entry["kind"],
-        step=entry["step"] / metre,
-        value=value,
-        sigma=float(found.fit.sigma[index] / found.scale),
-        low=min(reach[0], value),
-        high=max(reach[1], value),
-    )
-
-
-def _within(bounds: Bounds, f: Array, index: int, end: float) -> float:
-    """The furthest that one parameter can go towards an end with every limit kept."""
-    step = np.zeros_like(f)
-    step[index] = end - f[index]
-    gaps, speeds = bounds.rows @ f + bounds.constants, bounds.rows @ step
-    falling = speeds < 0.0
-    share = np.min(np.maximum(gaps[falling], 0.0) / -speeds[falling], initial=1.0)
-    return float(f[index] + share * step[index])
+def _sliders(found: AffineInference, names: Sequence[str]) -> list[Slider]:
+    """Of each parameter: over its range, as far as it can go alone with every limit kept."""
+    bounds, metre = _bounds(found), UNITS[found.unit]
+    entries = {entry["name"]: entry for entry in found.model.entries()}
+    sliders = []
+    for name in names:
+        index = found.model.template.names.index(name)
+        value, (low, high) = float(found.parameters[index]), entries[name]["typical"]
+        step = np.zeros_like(found.parameters)
+        reach = []
+        for end in size_range(value, (low / metre, high / metre)):
+            step[index] = end - value
+            share = bounds.furthest(found.parameters, step, relations=True)
+            reach.append(value + share * step[index])
+        entry = entries[name] | {"unit": found.unit, "step": entries[name]["step"] / metre}
+        sigma = float(found.fit.sigma[index] / found.scale)
+        sliders.append(Slider.of(entry, value, sigma, (reach[0], reach[1])))
+    return sliders
 
 
 def _bounds(found: AffineInference) -> Bounds:
@@ -146,17 +133,16 @@ def _targets(
     # What a normalised length is in the GLB, in metres.
     metre = file_unit(found.mesh.format, found.unit) / found.fit.normalization.scale
     size = float(np.linalg.norm(np.ptp(file.vertices, axis=0)))
-    every, rotation = np.arange(len(binding.jacobian)), turn.rotation
+    every, rotation = np.arange(len(binding.jacobian)), turn.rotation.astype(np.float32)
     for slider in offered:
         index = template.names.index(slider.name)
-        step = np.float64(found.scale)
         column = binding.jacobian[:, :, index].astype(np.float64) - anchor[:, index]
-        shift = turn.to_own(column) * (step * metre)
+        shift = turn.to_own(column) * (found.scale * metre)
         largest = np.abs(slider.change) * _largest(shift)
         shift[largest < SLIGHT * size / len(offered)] = 0.0
         gradient = binding.gradient(index, every)
-        cells = dict(zip(gradient.cells, gradient.values * np.float32(step), strict=True))
-        stretch = Stretch(cells).between(rotation.T.astype(np.float32), rotation.astype(np.float32))
+        cells = dict(zip(gradient.cells, gradient.values * np.float32(found.scale), strict=True))
+        stretch = Stretch(cells).between(rotation.T, rotation)
         yield from targets_of(slider, shift[of], stretch.at(of), paired)
 
 
@@ -168,12 +154,8 @@ def _largest(shift: Array) -> Array:
 
 def _measured(found: AffineInference, binding: Binding) -> dict[str, Plane]:
     """Derived dimensions that edits take from the mesh itself, affine in the parameters."""
-    fit, f = found.fit, found.parameters
-    levels = find_levels(
-        found.vertices, found.mesh.faces, fit.template, fit.parameters, fit.translation
-    )
-    rows = {}
-    for name, reading in found.dimensions(binding.jacobian, levels).readings.items():
+    f, rows = found.parameters, {}
+    for name, reading in found.dimensions(binding.jacobian).readings.items():
         if reading.corrects:
             value, row = reading.gauge.tangent(np.zeros_like(f))
             rows[name] = (value - float(row @ f), row)

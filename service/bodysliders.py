@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from service import deadline
 from service.bodyconstraints import STATURE
-from service.bodyedit import standing
+from service.bodyedit import ANGLES, standing
 from service.bodyinference import BodyInference
 from service.deform import skinbinding
 from service.deform.skinbinding import SkinBinding, sparse_rows
@@ -25,15 +25,13 @@ from service.mesh.stretch import Stretch
 from service.mesh.targets import Target, add_targets
 from service.mesh.unskin import unskinned
 from service.requests import RESTS, UNITS, SliderOptions, file_unit
-from service.skeleton import Skeleton
+from service.skeleton import Skeleton, joint_nodes
 from service.sliders import Slider, chosen, notes, targets_of
 from service.template.anatomy import JOINTS, PARENTS
 from service.template.jointnames import JOINT_NAMES
 from service.template.skinned import NAMES, SHAPES, Body
 
 Array = NDArray[np.float64]
-
-ANGLES = len(NAMES) - SHAPES
 
 
 def sliders(found: BodyInference, options: SliderOptions, keep: str) -> bytes:
@@ -91,6 +89,7 @@ class _Rigged:
                 f"rest={options.rest[:40]!r}",
                 f"Use one of {', '.join(JOINT_NAMES)}, and one of {', '.join(RESTS)}.",
             )
+        self.entries = {entry["name"]: entry for entry in found.model.entries()}
         self.metres = file_unit(found.mesh.format, found.unit)
         self.binding = binding
         self.rest = found.fit.body
@@ -147,27 +146,14 @@ class _Rigged:
         return standing(self.found.model.template, self.rest, after, self.keep)
 
     def _slider(self, name: str) -> Slider:
-        found, index = self.found, NAMES.index(name)
-        entry = next(entry for entry in found.model.entries() if entry["name"] == name)
-        value = float(self.rest.parameters[index])
-        low, high = entry["typical"]
-        return Slider(
-            name=name,
-            label=entry["label"],
-            group=entry["group"],
-            unit=entry["unit"],
-            kind=entry["kind"],
-            step=entry["step"],
-            value=value,
-            sigma=float(found.fit.sigma[index]),
-            low=min(low, value),
-            high=max(high, value),
-        )
+        index, entry = NAMES.index(name), self.entries[name]
+        value, sigma = float(self.rest.parameters[index]), float(self.found.fit.sigma[index])
+        return Slider.of(entry, value, sigma, entry["typical"])
 
     def _further(self) -> dict[str, Any]:
         """The stature, and where the joints are."""
         found = self.found
-        entry = next(e for e in found.model.entries() if e["name"] == STATURE)
+        entry = self.entries[STATURE]
         unit = UNITS[found.unit]
         value = found.stature(self.rest)
         # Linear in the shape as long as the same vertices are the highest and the lowest.
@@ -220,8 +206,8 @@ class _Rigged:
         found = {}
         for name in NAMES[ANGLES:]:
             if name in self.names:
-                after = Skeleton.of_binding(self.found, self.binding, self._shaped(name))
-                found[name] = (after.offsets - skeleton.offsets) * self.metres
+                offsets = joint_nodes(self.found, self._shaped(name))[:, :3, 3]
+                found[name] = (offsets - skeleton.offsets) * self.metres
         return found
 
     def _extras(self, joint: int, apart: Mapping[str, Array]) -> dict[str, Any]:

@@ -54,8 +54,6 @@ class EditOptions:
     strict: bool = False
 
 
-JOINT_NAMES = ("smpl", "mixamo", "vrm")
-"""Whose names a body's joints get."""
 RESTS = ("upload", "t_pose")
 """Poses that a body's mesh may be bound in."""
 
@@ -69,7 +67,7 @@ class SliderOptions:
         keep: the point that stays in place; None for the category's first.
         paired: two targets a parameter, for viewers that know no negative weights.
         quantize: store displacements as 16-bit fractions.
-        joint_names: one of `JOINT_NAMES`, for bodies.
+        joint_names: one of `jointnames.JOINT_NAMES`, for bodies.
         rest: one of `RESTS`, for bodies.
     """
 

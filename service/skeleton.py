@@ -62,26 +62,34 @@ class Skeleton:
             binding: of its vertices.
             body: the pose.
         """
-        template = found.model.template
-        frame = found.best.orientation.rotation.T
-        joints = found.own_joints(body)
-        binds = skinbinding.joint_matrices(template, body)
-        binds[:, :3, :3] = frame @ binds[:, :3, :3]
-        binds[:, :3, 3] = joints
-        above = np.eye(4)
-        above[:3, :3] = frame
-        inverses = np.asarray(np.linalg.inv(binds), dtype=np.float64)
-        parents = np.concatenate([above.T[None], inverses[list(PARENTS[1:])]])
-        nodes = parents @ binds
+        binds, nodes = joint_worlds(found, body), joint_nodes(found, body)
         order = np.argsort(-binding.weights, axis=1, kind="stable")[:, : skinbinding.INFLUENCES]
         return cls(
             names=JOINTS,
             parents=PARENTS,
-            frame=frame,
-            joints=joints,
+            frame=found.best.orientation.rotation.T,
+            joints=binds[:, :3, 3],
             rotations=nodes[:, :3, :3],
             offsets=nodes[:, :3, 3],
-            inverse_bind=inverses,
+            inverse_bind=np.asarray(np.linalg.inv(binds), dtype=np.float64),
             indices=order,
             weights=np.take_along_axis(binding.weights, order, axis=1),
         )
+
+
+def joint_worlds(found: BodyInference, body: Body) -> Array:
+    """``[24, 4, 4]`` each joint of a body in the upload's own frame and coordinates."""
+    worlds = skinbinding.joint_matrices(found.model.template, body)
+    worlds[:, :3, :3] = found.best.orientation.rotation.T @ worlds[:, :3, :3]
+    worlds[:, :3, 3] = found.own_joints(body)
+    return worlds
+
+
+def joint_nodes(found: BodyInference, body: Body) -> Array:
+    """``[24, 4, 4]`` each joint in its parent; the root in the canonical frame, turned alone."""
+    worlds = joint_worlds(found, body)
+    above = np.eye(4)
+    above[:3, :3] = found.best.orientation.rotation
+    inverses = np.linalg.inv(worlds[list(PARENTS[1:])])
+    nodes: Array = np.concatenate([above[None], inverses]) @ worlds
+    return nodes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +39,21 @@ class Slider:
     sigma: float
     low: float
     high: float
+
+    @classmethod
+    def of(
+        cls, entry: Mapping[str, Any], value: float, sigma: float, ends: tuple[float, float]
+    ) -> Slider:
+        """The slider of a parameter.
+
+        Args:
+            entry: what `GET /categories` says of it, in the unit.
+            value, sigma: as inferred.
+            ends: how far it may be moved, but that the value is always in between.
+        """
+        said = {name: entry[name] for name in ("name", "label", "group", "unit", "kind", "step")}
+        low, high = min(ends[0], value), max(ends[1], value)
+        return cls(**said, value=value, sigma=sigma, low=low, high=high)
 
     @property
     def change(self) -> float:

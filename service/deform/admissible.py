@@ -61,10 +61,11 @@ class Bounds:
         gaps = self._gaps(f)
         return [text for text, gap in zip(self.texts, gaps, strict=True) if gap < 0.0]
 
-    def furthest(self, f: Array, step: Array) -> float:
-        """The share of a step from ``f [d]``, up to 1, that breaks no size's limit."""
-        sizes = np.array([text.endswith("> 0") for text in self.texts])
-        gaps, speeds = (self.rows @ f + self.constants)[sizes], (self.rows @ step)[sizes]
+    def furthest(self, f: Array, step: Array, relations: bool = False) -> float:
+        """The share of a step from ``f [d]``, up to 1, that breaks no size's limit, and with
+        `relations` none of those either."""
+        among = np.array([relations or text.endswith("> 0") for text in self.texts], bool)
+        gaps, speeds = (self.rows @ f + self.constants)[among], (self.rows @ step)[among]
         falling = speeds < 0.0
         return float(np.min(np.maximum(gaps[falling], 0.0) / -speeds[falling], initial=1.0))
 

@@ -76,10 +76,6 @@ class Dimensions:
             if reading.mesh is not None
         }
 
-    def after(self, changes: Mapping[str, Change]) -> Array:
-        """Parameters ``[d]`` after the changes; see `outcome`."""
-        return self.outcome(changes).parameters
-
     def outcome(
         self,
         changes: Mapping[str, Change],

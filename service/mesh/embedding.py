@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from service.errors import ShapeError
+from service.mesh.buffers import ALIGNMENT
 from service.mesh.convert import convert
 from service.mesh.document import Object
 from service.mesh.folder import Folder
-from service.mesh.glb import BIN, HEADER, JSON, GlbFile, packed
+from service.mesh.glb import GlbFile, glb
 from service.mesh.gltf import GltfFile
-from service.mesh.jsontext import dump
 from service.mesh.looks import Looks
 from service.mesh.meshcopies import objects
 from service.mesh.meshfile import MeshFile
@@ -30,7 +30,6 @@ from service.mesh.polygons import Indices
 from service.mesh.wrapping import wrap
 from service.mesh.zipped import ZippedFile
 
-ALIGNMENT = 4
 LOGGER = logging.getLogger(__name__)
 
 
@@ -108,10 +107,7 @@ def _embedded(file: GltfFile) -> bytes:
             start = append(content)
             views.append({"buffer": 0, "byteOffset": start, "byteLength": len(content)})
     root["buffers"] = [{"byteLength": len(chunk)}]
-    text = dump(root).encode()
-    pieces = packed(JSON, text, b" " * (-len(text) % ALIGNMENT))
-    pieces += packed(BIN, chunk, bytes(-len(chunk) % ALIGNMENT))
-    return HEADER.pack(b"glTF", 2, HEADER.size + sum(map(len, pieces))) + b"".join(pieces)
+    return glb(root, chunk)
 
 
 def _image(file: GltfFile, image: Object) -> tuple[bytes, str] | None:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from service.mesh import limits
 from service.mesh.buffers import Buffers
-from service.mesh.document import Document
+from service.mesh.document import Document, Object
 from service.mesh.faults import malformed, unsupported
 from service.mesh.gltf import GltfFile
+from service.mesh.jsontext import dump
 
 HEADER = struct.Struct("<4sII")
 CHUNK = struct.Struct("<II")
@@ -63,6 +64,14 @@ class GlbFile(GltfFile):
         pieces.append(data[done:end])
         length = HEADER.size + sum(map(len, pieces))
         return b"".join([HEADER.pack(b"glTF", 2, length), *pieces, data[end:]])
+
+
+def glb(root: Object, chunk: Buffer) -> bytes:
+    """A GLB of a JSON document and its binary chunk."""
+    text = dump(root).encode()
+    pieces = packed(JSON, text, b" " * (-len(text) % 4))
+    pieces += packed(BIN, chunk, bytes(-len(chunk) % 4))
+    return b"".join([HEADER.pack(b"glTF", 2, HEADER.size + sum(map(len, pieces))), *pieces])
 
 
 def packed(kind: int, content: Buffer, padding: Buffer) -> list[Buffer]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from service.mesh.document import Document, Object
@@ -56,6 +56,24 @@ class Repointing:
             own = primitives[primitive]
             own["attributes"] = own["attributes"] | {attribute: accessor}
         return result | {"primitives": primitives}
+
+
+def replaced(
+    mesh: int, variants: Sequence[tuple[list[int], Object]], add_mesh: Callable[[Object], int]
+) -> dict[Path, Any]:
+    """JSON values that give nodes of one mesh what is theirs: the first its place, others copies.
+
+    Args:
+        mesh: its number.
+        variants: the nodes that show each, and its JSON.
+        add_mesh: adds one to the document and numbers it.
+    """
+    (_, first), *others = variants
+    edits: dict[Path, Any] = {("meshes", mesh): first}
+    for nodes, entry in others:
+        number = add_mesh(entry)
+        edits |= {("nodes", node, "mesh"): number for node in nodes}
+    return edits
 
 
 def pinned_accessors(document: Document) -> set[int]:

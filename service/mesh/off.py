@@ -54,11 +54,11 @@ class OffFile(MeshFile):
 
     def columns(self, start: int, count: int) -> Vertices:
         """``[V, count]`` numbers of the vertices, some of their `width`."""
-        return self._values[self._tokens.first[:, None] + np.arange(start, start + count)]
+        return self._values[self._columns(start, count)]
 
-    def _columns(self, start: int) -> Indices:
-        """``[V, 3]`` token numbers of three columns."""
-        return self._tokens.first[:, None] + np.arange(start, start + 3)
+    def _columns(self, start: int, count: int = 3) -> Indices:
+        """``[V, count]`` token numbers of some columns."""
+        return self._tokens.first[:, None] + np.arange(start, start + count)
 
     @moves.tolerant
     def write(self, vertices: Vertices, linear: Linear) -> bytes:

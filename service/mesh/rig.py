@@ -17,6 +17,7 @@ from service.mesh.document import Document, Object
 from service.mesh.geometry import Block, Use
 from service.mesh.glb import GlbFile
 from service.mesh.jsontext import END, Path
+from service.mesh.meshcopies import replaced
 
 Array = NDArray[np.float64]
 
@@ -124,21 +125,21 @@ class _Rigging:
         for node, primitives in shown.items():
             weights[node] = {p: self._weights(self._block(use)) for p, use in primitives.items()}
             groups[repr(sorted(weights[node].items()))].append(node)
+        variants = [
+            (members, self._with_weights(mesh, weights[members[0]])) for members in groups.values()
+        ]
+        self._edits |= replaced(mesh, variants, lambda entry: self._additions.add("meshes", entry))
+        for node, primitives in shown.items():
+            block = self._block(next(iter(primitives.values())))
+            self._edits["nodes", node, "skin"] = self._skin(block, joints)
+
+    def _with_weights(self, mesh: int, weights: dict[int, Object]) -> Object:
         old = self._document.entry("meshes", mesh)
-        for number, members in enumerate(groups.values()):
-            entries = [dict(entry) for entry in self._document.array(old, "primitives")]
-            for index, added in weights[members[0]].items():
-                had = self._document.object(entries[index], "attributes")
-                entries[index]["attributes"] = {**had, **added}
-            entry = {**old, "primitives": entries}
-            if number:
-                place = self._additions.add("meshes", entry)
-                self._edits |= {("nodes", node, "mesh"): place for node in members}
-            else:
-                self._edits["meshes", mesh] = entry
-            for node in members:
-                block = self._block(next(iter(shown[node].values())))
-                self._edits["nodes", node, "skin"] = self._skin(block, joints)
+        entries = [dict(entry) for entry in self._document.array(old, "primitives")]
+        for index, added in weights.items():
+            had = self._document.object(entries[index], "attributes")
+            entries[index]["attributes"] = {**had, **added}
+        return {**old, "primitives": entries}
 
     def _block(self, use: Use) -> Block:
         return self._file.geometry.blocks[use.block]

@@ -26,7 +26,7 @@ from service.mesh.faults import unsupported
 from service.mesh.geometry import NORMAL, POSITION, Block, Use
 from service.mesh.gltf import GltfFile
 from service.mesh.jsontext import Path
-from service.mesh.meshcopies import objects
+from service.mesh.meshcopies import objects, replaced
 from service.mesh.placement import Placement, times
 from service.mesh.stretch import Stretch
 
@@ -175,16 +175,17 @@ class _Adding:
         groups: dict[str, list[int]] = defaultdict(list)
         for node, primitives in nodes.items():
             groups[repr([(p, primitives[p].targets) for p in sorted(primitives)])].append(node)
-        edits: dict[Path, Any] = {}
         old = self._document.entry("meshes", mesh)
-        for number, members in enumerate(groups.values()):
-            entry, count = self._with_targets(mesh, old, nodes[members[0]])
-            place = mesh
-            if number:
-                place = self._deltas.additions.add("meshes", entry)
-                edits |= {("nodes", node, "mesh"): place for node in members}
-            else:
-                edits["meshes", mesh] = entry
+        variants = [
+            (members, *self._with_targets(mesh, old, nodes[members[0]]))
+            for members in groups.values()
+        ]
+        edits = replaced(
+            mesh,
+            [(members, entry) for members, entry, _ in variants],
+            lambda entry: self._deltas.additions.add("meshes", entry),
+        )
+        for members, _, count in variants:
             for node in members:
                 if weights := self._document.array(self._document.entry("nodes", node), "weights"):
                     edits["nodes", node, "weights"] = self._weights(weights, count)

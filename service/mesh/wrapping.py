@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from service.mesh.additions import VERTEX_DATA, Additions, box
 from service.mesh.buffers import Draft
 from service.mesh.document import Object
 from service.mesh.folder import Folder
-from service.mesh.glb import BIN, HEADER, JSON, GlbFile, packed
+from service.mesh.glb import GlbFile, glb
 from service.mesh.jsontext import Path
 from service.mesh.looks import Looks, Part, Values
 from service.mesh.materials import Materials
@@ -54,9 +53,7 @@ def _blank() -> bytes:
         "scenes": [{"nodes": []}],
         "nodes": [{"mesh": 0}],
     }
-    text = json.dumps(root).encode()
-    pieces = packed(JSON, text, b" " * (-len(text) % 4)) + packed(BIN, b"", b"")
-    return HEADER.pack(b"glTF", 2, HEADER.size + sum(map(len, pieces))) + b"".join(pieces)
+    return glb(root, b"")
 
 
 def _primitive(

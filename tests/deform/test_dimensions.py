@@ -57,7 +57,9 @@ def named(values: np.ndarray) -> dict[str, float]:
 
 
 def after(dimensions: Dimensions, **changes: tuple[Kind, float]) -> dict[str, float]:
-    return named(dimensions.after({name: Change(*change) for name, change in changes.items()}))
+    return named(
+        dimensions.outcome({name: Change(*change) for name, change in changes.items()}).parameters
+    )
 
 
 @pytest.mark.parametrize("name", CHAIR.names)
@@ -74,10 +76,10 @@ def test_a_parameter_changes_alone(name: str) -> None:
 
 def test_no_change_leaves_every_bit() -> None:
     dimensions = with_wings()
-    assert np.array_equal(dimensions.after({}), F)
+    assert np.array_equal(dimensions.outcome({}).parameters, F)
     derived = dimensions.derived(F)
     same = {name: Change("set", value) for name, value in derived.items()}
-    np.testing.assert_array_equal(dimensions.after(same), F)
+    np.testing.assert_array_equal(dimensions.outcome(same).parameters, F)
 
 
 def test_derived_dimensions_are_read_from_the_parameters_and_the_mesh() -> None:
@@ -114,7 +116,7 @@ def test_the_total_height_is_shared_in_proportion() -> None:
 def test_extents_are_exact_on_the_mesh_itself(name: str, factor: float) -> None:
     dimensions = with_wings()
     target = dimensions.derived(F)[name] * factor
-    values = dimensions.after({name: Change("scale", factor)})
+    values = dimensions.outcome({name: Change("scale", factor)}).parameters
     moved = dimensions.vertices + dimensions.jacobian @ (values - F)
     measured = {
         "seat_top_height": values[CHAIR.names.index("leg_height")] + 0.06,
@@ -131,7 +133,7 @@ def test_an_extent_whose_outermost_vertex_changes_is_still_exact() -> None:
     jacobian = np.concatenate([CHAIR.jacobian, np.zeros((2, 3, 8))])
     jacobian[-2, 0, CHAIR.names.index("seat_width")] = 0.1
     dimensions = Dimensions(CHAIR, F, vertices, jacobian=jacobian)
-    values = dimensions.after({"total_width": Change("set", 0.9)})
+    values = dimensions.outcome({"total_width": Change("set", 0.9)}).parameters
     moved = vertices + jacobian @ (values - F)
     assert np.ptp(moved[:, 0]) == pytest.approx(0.9, rel=1e-6)
 
@@ -149,8 +151,8 @@ def test_the_order_of_the_changes_makes_no_difference() -> None:
         "seat_top_height": Change("scale", 1.1),
         "seat_thickness": Change("add", 0.02),
     }
-    forward = box_chair().after(changes)
-    backward = box_chair().after(dict(reversed(changes.items())))
+    forward = box_chair().outcome(changes).parameters
+    backward = box_chair().outcome(dict(reversed(changes.items()))).parameters
     np.testing.assert_array_equal(forward, backward)
     assert named(forward)["leg_height"] == pytest.approx(1.1 * 0.42 - 0.08)
 
@@ -171,7 +173,7 @@ def test_derived_changes_start_from_the_values_before_the_edit() -> None:
 )
 def test_a_dimension_with_nothing_left_to_move_is_refused(changes: dict[str, float]) -> None:
     with pytest.raises(InvalidRequest) as caught:
-        box_chair().after({name: Change("set", value) for name, value in changes.items()})
+        box_chair().outcome({name: Change("set", value) for name, value in changes.items()})
     assert caught.value.code == "dimension_fixed"
     assert next(iter(changes)) in caught.value.detail
 
@@ -258,7 +260,7 @@ def test_an_unknown_name_is_refused_and_the_known_ones_listed() -> None:
 def test_the_mesh_is_left_as_it_was() -> None:
     dimensions = box_chair()
     parameters, vertices = dimensions.parameters.copy(), dimensions.vertices.copy()
-    dimensions.after({"total_height": Change("set", 1.2), "seat_width": Change("scale", 2)})
+    dimensions.outcome({"total_height": Change("set", 1.2), "seat_width": Change("scale", 2)})
     assert np.array_equal(dimensions.parameters, parameters)
     assert np.array_equal(dimensions.vertices, vertices)
 

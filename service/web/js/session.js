@@ -2,7 +2,6 @@
 
 import * as THREE from "three";
 import { $, announce, save } from "./dom.js";
-import { DimensionLines } from "./dimensions.js";
 import { History } from "./history.js";
 import { Measure } from "./measure.js";
 import { Overlay } from "./overlay.js";
