@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -46,6 +47,15 @@ def test_time_that_others_took_is_overload() -> None:
     with deadline.limit(0.02):
         time.sleep(0.04)
         with pytest.raises(Overloaded, match=r"deadline_exceeded.*0\.02 s"):
+            deadline.check()
+
+
+def test_work_that_nobody_waits_for_ends() -> None:
+    abandoned = Event()
+    with deadline.limit(60, abandoned):
+        deadline.check()
+        abandoned.set()
+        with pytest.raises(deadline.Abandoned):
             deadline.check()
 
 
