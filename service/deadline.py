@@ -21,8 +21,12 @@ OWN_WORK = 0.5
 """Share of the time that the work itself must have had on a CPU for it to be the upload's fault."""
 
 
-class Abandoned(Exception):
-    """Nobody waits for the answer any more."""
+class Abandoned(BaseException):
+    """Nobody waits for the answer any more.
+
+    No `Exception`, as a cancellation is none: what turns the errors of damaged files into answers
+    has to let it pass.
+    """
 
 
 @dataclass(frozen=True)
