@@ -1,4 +1,4 @@
-"""How many CPUs this process may use: a container's quota, not the machine's count."""
+"""How many CPUs and how much memory this process may use: a container's quota, not the machine's."""
 
 from __future__ import annotations
 
@@ -23,18 +23,46 @@ def cpu_count(root: Path = Path("/"), affinity: int | None = None) -> int:
     return max(1, math.ceil(min([allowed, *_quotas(root)])))
 
 
+def memory_bytes(root: Path = Path("/"), physical: int | None = None) -> int:
+    """Bytes of memory within the machine's and the limits of the process's cgroups.
+
+    Args:
+        root: where ``proc`` and ``sys`` are mounted.
+        physical: the machine's own; by default asked of the system.
+    """
+    if physical is None:
+        physical = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return min([physical, *_memory_limits(root)])
+
+
 def _quotas(root: Path) -> Iterator[float]:
     """CPUs granted by each cgroup that the process is in, version 1 and 2."""
+    for group in _groups(root):
+        yield from _version_2(group)
+    for group in _groups(root, "cpu"):
+        yield from _version_1(group)
+
+
+def _memory_limits(root: Path) -> Iterator[int]:
+    """Bytes granted likewise; version 1 says that there is no limit by a huge one."""
+    groups = [(group, "memory.max") for group in _groups(root)]
+    groups += [(group, "memory.limit_in_bytes") for group in _groups(root, "memory")]
+    for group, name in groups:
+        limit = _read(group / name).strip()
+        if limit and limit != "max":
+            yield int(limit)
+
+
+def _groups(root: Path, controller: str | None = None) -> Iterator[Path]:
+    """Folders of the version 2 cgroups that the process is in, or of a version 1 controller's."""
     mount = root / "sys/fs/cgroup"
     for line in _read(root / "proc/self/cgroup").splitlines():
         _, controllers, path = line.split(":", 2)
-        if not controllers:
-            for group in _ancestry(mount, path):
-                yield from _version_2(group)
-        elif "cpu" in controllers.split(","):
-            for name in ("cpu", controllers):
-                for group in _ancestry(mount / name, path):
-                    yield from _version_1(group)
+        if controller is None and not controllers:
+            yield from _ancestry(mount, path)
+        elif controller is not None and controller in controllers.split(","):
+            for name in dict.fromkeys((controller, controllers)):
+                yield from _ancestry(mount / name, path)
 
 
 def _ancestry(mount: Path, path: str) -> Iterator[Path]:

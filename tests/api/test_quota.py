@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from service.api.quota import cpu_count
+from service.api.quota import cpu_count, memory_bytes
 
 
 @pytest.fixture
@@ -61,3 +61,43 @@ def test_version_1_quota_seen_from_inside_a_container(
 
 def test_this_machine_has_a_cpu() -> None:
     assert cpu_count() >= 1
+
+
+GIB = 1 << 30
+
+
+def test_without_cgroups_the_machines_memory_counts(root: Path) -> None:
+    assert memory_bytes(root, physical=4 * GIB) == 4 * GIB
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"),
+    [("max\n", 4 * GIB), ("536870912\n", GIB // 2), (f"{16 * GIB}\n", 4 * GIB)],
+)
+def test_version_2_memory_limit(root: Path, limit: str, expected: int) -> None:
+    write(root / "proc/self/cgroup", "0::/\n")
+    write(root / "sys/fs/cgroup/memory.max", limit)
+    assert memory_bytes(root, physical=4 * GIB) == expected
+
+
+def test_version_2_takes_the_least_memory_of_all_ancestors(root: Path) -> None:
+    write(root / "proc/self/cgroup", "0::/pods/service\n")
+    write(root / "sys/fs/cgroup/pods/memory.max", f"{GIB}\n")
+    write(root / "sys/fs/cgroup/pods/service/memory.max", f"{2 * GIB}\n")
+    assert memory_bytes(root, physical=4 * GIB) == GIB
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"),
+    [("9223372036854771712\n", 4 * GIB), ("536870912\n", GIB // 2)],
+)
+def test_version_1_memory_limit_seen_from_inside_a_container(
+    root: Path, limit: str, expected: int
+) -> None:
+    write(root / "proc/self/cgroup", "5:memory:/docker/ab\n4:cpu,cpuacct:/docker/ab\n0::/\n")
+    write(root / "sys/fs/cgroup/memory/memory.limit_in_bytes", limit)
+    assert memory_bytes(root, physical=4 * GIB) == expected
+
+
+def test_this_machine_has_memory() -> None:
+    assert memory_bytes() > 64 << 20
