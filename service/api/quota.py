@@ -1,4 +1,4 @@
-"""How many CPUs and how much memory this process may use: a container's quota, not the machine's."""
+"""How many CPUs and how much memory this process may use: the container's, not the machine's."""
 
 from __future__ import annotations
 
