@@ -22,11 +22,18 @@ networks, the fit to the mesh, binding the mesh to the template, moving it, writ
 
 @dataclass(frozen=True)
 class Interval:
-    """A piece of work on a stage, in seconds since the epoch, and how long it took itself."""
+    """A piece of work on a stage.
+
+    Attributes:
+        start: in seconds since the epoch.
+        seconds: that it took itself, without the stages within it.
+        whole: with those.
+    """
 
     stage: str
     start: float
     seconds: float
+    whole: float
 
 
 @dataclass
@@ -36,9 +43,9 @@ class Record:
     intervals: list[Interval] = field(default_factory=list)
     _within: list[float] = field(default_factory=list)
 
-    def add(self, stage: str, start: float, seconds: float) -> None:
-        """Note work that began at ``start``, in seconds since the epoch."""
-        self.intervals.append(Interval(stage, start, seconds))
+    def add(self, stage: str, start: float, seconds: float, whole: float | None = None) -> None:
+        """Note work as `Interval` has it; by default it had no stages within."""
+        self.intervals.append(Interval(stage, start, seconds, seconds if whole is None else whole))
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -59,7 +66,7 @@ class Record:
             yield
         finally:
             whole = time.perf_counter() - start
-            self.add(stage, epoch, whole - self._within.pop())
+            self.add(stage, epoch, whole - self._within.pop(), whole)
             if self._within:
                 self._within[-1] += whole
 

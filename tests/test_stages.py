@@ -43,6 +43,9 @@ def test_a_stage_within_another_counts_once() -> None:
     assert record.seconds["refine"] >= 0.05
     assert record.seconds["encode"] >= 0.02
     assert sum(record.seconds.values()) <= whole
+    refine, encode = record.intervals
+    assert refine.whole == refine.seconds
+    assert encode.whole == pytest.approx(encode.seconds + refine.whole)
 
 
 def test_a_stage_that_fails_is_noted_all_the_same() -> None:
