@@ -1,4 +1,4 @@
-"""GET /: the viewer, a page that uses this service from a browser; and GET /web/...: its files."""
+"""GET / and /docs: pages that use this service from a browser; and GET /web/...: their files."""
 
 from __future__ import annotations
 
@@ -38,10 +38,9 @@ _POLICY = (
     "connect-src 'self' blob:; manifest-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-_SAFETY = {
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
+_PAGES_ALONE = {
     "Cross-Origin-Opener-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), geolocation=(), microphone=(), payment=(), usb=()",
 }
 
 router = APIRouter(include_in_schema=False)
@@ -49,7 +48,7 @@ router = APIRouter(include_in_schema=False)
 
 @dataclass(frozen=True)
 class Page:
-    """A file of the viewer, ready to be sent.
+    """A file of the pages, ready to be sent.
 
     Attributes:
         plain, packed: its bytes, as they are and by gzip; None where that is no gain.
@@ -75,6 +74,11 @@ async def viewer(request: Request) -> Response:
     return _answer(request, "index.html")
 
 
+@router.get("/docs")
+async def docs(request: Request) -> Response:
+    return _answer(request, "docs.html")
+
+
 @router.get("/web/{path:path}")
 async def static(request: Request, path: str) -> Response:
     return _answer(request, path)
@@ -88,9 +92,9 @@ def _page(path: Path) -> Page:
         "Content-Type": MEDIA_TYPES[path.suffix],
         "Cache-Control": _FOREVER if vendored else _REVALIDATED,
         "Vary": "Accept-Encoding",
-        **_SAFETY,
     }
     if path.suffix == ".html":
+        headers |= _PAGES_ALONE
         headers["Content-Security-Policy"] = _POLICY.format(scripts=_inline_scripts(plain.decode()))
     smaller = len(packed) < 0.9 * len(plain)
     digest = hashlib.sha256(plain).hexdigest()[:32]

@@ -13,6 +13,7 @@ from service.api.hangup import can_listen, reload_on_hangup
 
 def test_each_hangup_reloads() -> None:
     seen: list[int] = []
+    read: list[int] = []
 
     async def hang_up_twice() -> None:
         reloaded = anyio.Semaphore(0)
@@ -22,8 +23,9 @@ def test_each_hangup_reloads() -> None:
             reloaded.release()
 
         readiness: Any = SimpleNamespace(reload=reload)
+        keys: Any = SimpleNamespace(reload=lambda: read.append(1))
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(reload_on_hangup, readiness)
+            tasks.start_soon(reload_on_hangup, readiness, keys)
             await anyio.sleep(0.05)
             for _ in range(2):
                 os.kill(os.getpid(), signal.SIGHUP)
@@ -33,7 +35,7 @@ def test_each_hangup_reloads() -> None:
 
     before = signal.getsignal(signal.SIGHUP)
     anyio.run(hang_up_twice)
-    assert len(seen) == 2
+    assert len(seen) == len(read) == 2
     assert signal.getsignal(signal.SIGHUP) == before
 
 
