@@ -74,14 +74,16 @@ def judge(found: AffineInference) -> Iterator[Result]:
     """Ask for each derived dimension of an upload and measure what comes of it."""
     fit = found.fit
     binding = bind(found, "blend")
-    at = found.vertices, found.mesh.faces, fit.template
-    levels = find_levels(*at, fit.parameters, fit.translation)
-    measured = {way: found.dimensions(binding.jacobian, levels if m else None)
-                for way, (m, _) in WAYS.items()}  # fmt: skip
+    by_mesh = found.dimensions(binding.jacobian)
+    by_fit = Dimensions(
+        fit.template, found.parameters, found.vertices, found.scale, binding.jacobian
+    )
     told = found.dimensions().derived(found.parameters)
-    for (name, value), factor, (way, (_, ask)) in product(told.items(), FACTORS, WAYS.items()):
+    for (name, value), factor, (way, (measures, ask)) in product(
+        told.items(), FACTORS, WAYS.items()
+    ):
         try:
-            outcome = ask(measured[way], name, factor * value)
+            outcome = ask(by_mesh if measures else by_fit, name, factor * value)
         except (InvalidRequest, Unsatisfiable):
             yield Result(name, way, None)
             continue
