@@ -36,6 +36,17 @@ TAGS = [
 ]
 
 
+SECURITY_SCHEMES = {
+    "bearer": {"type": "http", "scheme": "bearer", "description": "An API key, as `Bearer <key>`."},
+    "header": {
+        "type": "apiKey",
+        "in": "header",
+        "name": "X-API-Key",
+        "description": "The same key, where `Authorization` is taken.",
+    },
+}
+
+
 def document(app: FastAPI) -> dict[str, Any]:
     """The app's OpenAPI document; while models are loaded it lists their categories."""
     spec = _contract(app)
@@ -65,17 +76,34 @@ def _contract(app: FastAPI) -> dict[str, Any]:
             tags=TAGS,
             routes=app.routes,
         )
-        schemas = spec["components"]["schemas"]
-        schemas["ProblemDocument"] = ProblemDocument.model_json_schema()
-        _drop_the_frameworks_errors(spec)
+        _add_problems(spec["components"]["schemas"])
+        _ask_for_keys(spec)
+        _tidy_answers(spec)
         app.openapi_schema = spec
     return app.openapi_schema
 
 
-def _drop_the_frameworks_errors(spec: dict[str, Any]) -> None:
-    """Errors that FastAPI lists of itself, in a shape that this service never sends."""
+def _add_problems(schemas: dict[str, Any]) -> None:
+    """Add the schema of problems, and those that it refers to."""
+    problem = ProblemDocument.model_json_schema(ref_template="#/components/schemas/{model}")
+    schemas.update(problem.pop("$defs"))
+    schemas["ProblemDocument"] = problem
+
+
+def _ask_for_keys(spec: dict[str, Any]) -> None:
+    """Let each operation that may answer 401 take a key; the empty entry makes it optional."""
+    spec["components"]["securitySchemes"] = SECURITY_SCHEMES
     for operations in spec["paths"].values():
         for operation in operations.values():
+            if "401" in operation["responses"]:
+                operation["security"] = [{}, *({scheme: []} for scheme in SECURITY_SCHEMES)]
+
+
+def _tidy_answers(spec: dict[str, Any]) -> None:
+    """Put answers in order, and leave out FastAPI's own 422, of a shape that is never sent."""
+    for operations in spec["paths"].values():
+        for operation in operations.values():
+            operation["responses"] = dict(sorted(operation["responses"].items()))
             if "application/json" in operation["responses"].get("422", {}).get("content", {}):
                 del operation["responses"]["422"]
     for name in ("HTTPValidationError", "ValidationError"):
