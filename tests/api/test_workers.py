@@ -2,14 +2,45 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Awaitable, Callable
+from typing import Any
 
 import anyio
 import anyio.to_thread
 import pytest
+from fastapi import Request
+from starlette.types import Message
 
-from service import deadline
+from service import deadline, stages
+from service.api.left import ClientLeft
 from service.api.workers import Workers
 from service.errors import Overloaded
+
+
+class Caller:
+    """A request whose client can be made to leave."""
+
+    def __init__(self, **state: Any) -> None:
+        self.left = anyio.Event()
+        self.request = Request({"type": "http", "state": state}, self._receive)
+
+    async def _receive(self) -> Message:
+        await self.left.wait()
+        return {"type": "http.disconnect"}
+
+    def leave(self) -> None:
+        self.left.set()
+
+
+async def until(happens: Callable[[], bool]) -> None:
+    with anyio.fail_after(20):
+        while not happens():
+            await anyio.sleep(0.001)
+
+
+async def expect(error: type[BaseException], awaitable: Awaitable[Any]) -> None:
+    with pytest.raises(error):
+        await awaitable
 
 
 def test_no_more_than_count_run_at_once() -> None:
@@ -31,16 +62,35 @@ def test_no_more_than_count_run_at_once() -> None:
         workers = Workers(2)
         async with anyio.create_task_group() as tasks:
             for _ in range(6):
-                tasks.start_soon(workers.run, work)
-            return await anyio.to_thread.run_sync(watch)
+                tasks.start_soon(workers.run, Caller().request, work)
+            await until(lambda: workers.working == 2 and workers.queued == 4)
+            result = await anyio.to_thread.run_sync(watch)
+        assert (workers.working, workers.queued) == (0, 0)
+        return result
 
     assert anyio.run(six) == [True, True, False]
     assert all(entered.acquire(blocking=False) for _ in range(4))
 
 
-def test_results_and_errors_come_back() -> None:
+def test_first_come_first_served() -> None:
+    order: list[int] = []
+
+    async def eight() -> None:
+        workers = Workers(1)
+        async with anyio.create_task_group() as tasks:
+            for number in range(8):
+                tasks.start_soon(workers.run, Caller().request, order.append, number)
+                await until(lambda number=number: workers.queued + len(order) > number)
+
+    anyio.run(eight)
+    assert order == list(range(8))
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_results_and_errors_come_back(asked: bool) -> None:
     async def divide(a: int, b: int) -> float:
-        return await Workers(1).run(lambda x, y: x / y, a, b)
+        request = Caller().request if asked else None
+        return await Workers(1).run(request, lambda x, y: x / y, a, b)
 
     assert anyio.run(divide, 6, 3) == 2.0
     with pytest.raises(ZeroDivisionError):
@@ -56,9 +106,136 @@ def test_each_function_has_its_own_deadline() -> None:
     async def two() -> str:
         workers = Workers(1, 0.05)
         with pytest.raises(Overloaded):
-            await workers.run(work, 0.1)
-        # Not even one that waited for its thread all that time has less.
-        return await workers.run(work, 0.0)
+            await workers.run(None, work, 0.1)
+        # What others took before is no part of it.
+        return await workers.run(None, work, 0.0)
 
     assert anyio.run(two) == "done"
     deadline.check()
+
+
+def test_what_waited_longer_than_the_deadline_is_not_begun() -> None:
+    gate = threading.Event()
+    begun: list[int] = []
+
+    async def wait_too_long() -> None:
+        workers = Workers(1, 0.05)
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(workers.run, None, gate.wait, 20)
+            await until(lambda: workers.working == 1)
+            tasks.start_soon(expect, Overloaded, workers.run(Caller().request, begun.append, 1))
+            await until(lambda: workers.queued == 1)
+            await anyio.sleep(0.06)
+            gate.set()
+        await workers.run(None, begun.append, 2)
+
+    anyio.run(wait_too_long)
+    assert begun == [2]
+
+
+def test_a_client_that_leaves_the_queue_leaves_its_place() -> None:
+    gate = threading.Event()
+    begun: list[int] = []
+
+    async def leave() -> None:
+        workers = Workers(1)
+        caller = Caller()
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(workers.run, None, gate.wait, 20)
+            await until(lambda: workers.working == 1)
+            tasks.start_soon(expect, ClientLeft, workers.run(caller.request, begun.append, 1))
+            await until(lambda: workers.queued == 1)
+            caller.leave()
+            await until(lambda: workers.queued == 0)
+            assert workers.working == 1
+            gate.set()
+
+    anyio.run(leave)
+    assert begun == []
+
+
+def test_work_for_a_client_that_left_ends_where_it_looks() -> None:
+    entered, ended = threading.Event(), threading.Event()
+
+    def work() -> None:
+        entered.set()
+        try:
+            while True:
+                deadline.check()
+                time.sleep(0.001)
+        finally:
+            ended.set()
+
+    async def leave() -> None:
+        workers = Workers(1)
+        caller = Caller()
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(expect, ClientLeft, workers.run(caller.request, work))
+            await until(entered.is_set)
+            caller.leave()
+        assert ended.is_set()
+        assert workers.working == 0
+
+    anyio.run(leave)
+
+
+def test_work_whose_request_the_server_cancels_ends_too() -> None:
+    entered, ended = threading.Event(), threading.Event()
+
+    def work() -> None:
+        entered.set()
+        try:
+            while True:
+                deadline.check()
+                time.sleep(0.001)
+        finally:
+            ended.set()
+
+    async def cancel() -> None:
+        import asyncio
+
+        workers = Workers(1)
+        task = asyncio.create_task(workers.run(Caller().request, work))
+        await until(entered.is_set)
+        task.cancel()
+        await expect(asyncio.CancelledError, task)
+        await until(ended.is_set)
+        assert workers.working == 0
+
+    anyio.run(cancel)
+
+
+def test_the_wait_and_the_stages_are_recorded() -> None:
+    gate = threading.Event()
+    record = stages.Record()
+
+    def work() -> None:
+        with stages.stage("encode"):
+            time.sleep(0.01)
+
+    async def queue() -> None:
+        workers = Workers(1)
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(workers.run, None, gate.wait, 20)
+            await until(lambda: workers.working == 1)
+            tasks.start_soon(workers.run, Caller(record=record).request, work)
+            await until(lambda: workers.queued == 1)
+            await anyio.sleep(0.02)
+            gate.set()
+
+    anyio.run(queue)
+    assert list(record.seconds) == ["queue", "encode"]
+    assert record.seconds["queue"] >= 0.02
+    assert record.seconds["encode"] >= 0.01
+
+
+def test_the_pace_is_that_of_requests() -> None:
+    async def work() -> float:
+        workers = Workers(1)
+        await workers.run(None, time.sleep, 0.05)
+        assert workers.pace == 0
+        for _ in range(3):
+            await workers.run(Caller().request, time.sleep, 0.02)
+        return workers.pace
+
+    assert anyio.run(work) >= 0.02
