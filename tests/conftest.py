@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ from starlette.types import ASGIApp
 
 from service.api.schemas import ProblemDocument
 from service.main import create_app
+from service.server import listen
 from service.settings import Settings
 from service.template.bodyfile import load_body
 from service.template.loader import load_template
@@ -32,7 +32,7 @@ CheckProblem = Callable[[httpx.Response, int, str], ProblemDocument]
 @contextmanager
 def _serving(app: ASGIApp) -> Iterator[httpx.Client]:
     """An app behind a real server on a free port, and a client of it."""
-    listener = socket.create_server(("127.0.0.1", 0))
+    (listener,) = listen("127.0.0.1", 0)
     server = uvicorn.Server(uvicorn.Config(app, log_config=None))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
