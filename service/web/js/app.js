@@ -119,6 +119,8 @@ takeFiles(open);
 
 addEventListener("keydown", (event) => {
   if (event.key === "Escape") {
+    // That of a dialog is the dialog's own.
+    if (event.target.closest?.("dialog")) return;
     if (opening) opening.abort();
     else clearProblems();
     return;
@@ -133,6 +135,6 @@ addEventListener("keydown", (event) => {
 });
 
 addEventListener("input", ({ target }) => {
-  if (target.type === "text") target.dataset.typing = "yes";
+  if (target.type === "text" || target.type === "password") target.dataset.typing = "yes";
 });
 addEventListener("change", ({ target }) => delete target.dataset?.typing);

@@ -1,6 +1,7 @@
 // How a file is to be read, where the user knows better.
 
 import { $, h } from "./dom.js";
+import { keyring } from "./key.js";
 import { categories } from "./service.js";
 
 const FIELDS = ["category", "up", "front", "units"];
@@ -12,13 +13,17 @@ export class Options {
         $(`option-${name}`).append(h("option", { value: way }, way.toUpperCase().replace("-", "\u2212")));
       }
     }
-    this.ready = this.list();
+    this.list();
+    keyring.addEventListener("change", () => this.list());
   }
 
   async list() {
     try {
-      for (const { name, label } of await categories()) {
-        $("option-category").append(h("option", { value: name }, label));
+      const found = await categories();
+      const select = $("option-category");
+      const old = new Set([...select.options].map((option) => option.value));
+      for (const { name, label } of found) {
+        if (!old.has(name)) select.append(h("option", { value: name }, label));
       }
     } catch {
       // The list is a convenience: "find out" works without it.

@@ -1,18 +1,25 @@
 // Requests to the service this page came from.
 
+import { keyring } from "./key.js";
 import { Problem } from "./problem.js";
 
 /**
- * Send a form and follow it on its way; the answer is {buffer, headers}.
+ * Send a form, with a key where one is wanted, and follow it on its way; the answer is
+ * {buffer, header}.
  *
- * XMLHttpRequest, as fetch tells nothing of an upload's progress.
  * @param on {uploading(share), waiting(), receiving(share)}
  */
-export function send(path, form, { accept, on = {}, signal } = {}) {
+export function send(path, form, more = {}) {
+  return keyring.unlock((headers) => attempt(path, form, headers, more));
+}
+
+/** XMLHttpRequest, as fetch tells nothing of an upload's progress. */
+function attempt(path, form, headers, { accept, on = {}, signal }) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open("POST", path);
     request.responseType = "arraybuffer";
+    for (const [name, value] of Object.entries(headers)) request.setRequestHeader(name, value);
     if (accept) request.setRequestHeader("Accept", accept);
     const share = (event) => (event.lengthComputable && event.total ? event.loaded / event.total : null);
     request.upload.onprogress = (event) => on.uploading?.(share(event));
@@ -59,7 +66,8 @@ export class Source {
   }
 }
 
+/** The installed categories; none while the service wants a key that is not there yet. */
 export async function categories() {
-  const answer = await fetch("categories");
+  const answer = await fetch("categories", { headers: keyring.headers });
   return answer.ok ? (await answer.json()).categories : [];
 }

@@ -3,6 +3,7 @@
 import * as THREE from "three";
 import { $, announce, save } from "./dom.js";
 import { History } from "./history.js";
+import { keyring } from "./key.js";
 import { Measure } from "./measure.js";
 import { Overlay } from "./overlay.js";
 import { fillPanel } from "./panel.js";
@@ -68,7 +69,7 @@ export class Session {
   request() {
     const { file, options } = this.source;
     const fields = Object.fromEntries(Object.entries({ ...options, ...this.fields() }).filter(([, v]) => v));
-    return { url: new URL("edit", document.baseURI).href, file: file.name, fields, output: outputName(file.name, this.format) };
+    return { url: new URL("edit", document.baseURI).href, file: file.name, fields, output: outputName(file.name, this.format), locked: keyring.wanted };
   }
 
   show() {

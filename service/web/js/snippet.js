@@ -16,20 +16,25 @@ export function outputName(name, format) {
   return `${stem}-edited.${format || suffix.toLowerCase()}`;
 }
 
-/** @param request {url, file, fields: {edits, ...}, output} */
+/**
+ * A key is never shown: the code takes it from the environment.
+ *
+ * @param request {url, file, fields: {edits, ...}, output, locked: whether a key is wanted}
+ */
 export const LANGUAGES = {
-  curl: ({ url, file, fields, output }) => [
+  curl: ({ url, file, fields, output, locked }) => [
     `curl --fail-with-body -F ${curlFile(file)}`,
+    ...(locked ? ['-H "Authorization: Bearer $API_KEY"'] : []),
     ...Object.entries(fields).map(([name, value]) => `-F ${shell(`${name}=${value}`)}`),
     `-o ${shell(output)} ${shell(url)}`,
   ].join(" \\\n  "),
 
-  Python: ({ url, file, fields, output }) => `import httpx
+  Python: ({ url, file, fields, output, locked }) => `${locked ? "import os\n\n" : ""}import httpx
 
 with open(${literal(file)}, "rb") as mesh:
     answer = httpx.post(
         ${literal(url)},
-        files={"mesh": mesh},
+${locked ? `        headers={"Authorization": "Bearer " + os.environ["API_KEY"]},\n` : ""}        files={"mesh": mesh},
         data={
 ${Object.entries(fields).map(([name, value]) => `            ${literal(name)}: ${literal(value)},`).join("\n")}
         },
@@ -40,13 +45,13 @@ with open(${literal(output)}, "wb") as edited:
     edited.write(answer.content)
 `,
 
-  JavaScript: ({ url, file, fields, output }) => `import { openAsBlob } from "node:fs";
+  JavaScript: ({ url, file, fields, output, locked }) => `import { openAsBlob } from "node:fs";
 import { writeFile } from "node:fs/promises";
 
 const form = new FormData();
 form.append("mesh", await openAsBlob(${literal(file)}), ${literal(file)});
 ${Object.entries(fields).map(([name, value]) => `form.append(${literal(name)}, ${literal(value)});`).join("\n")}
-const answer = await fetch(${literal(url)}, { method: "POST", body: form });
+${locked ? "const headers = { Authorization: `Bearer ${process.env.API_KEY}` };\n" : ""}const answer = await fetch(${literal(url)}, { method: "POST",${locked ? " headers," : ""} body: form });
 if (!answer.ok) throw new Error((await answer.json()).detail);
 await writeFile(${literal(output)}, Buffer.from(await answer.arrayBuffer()));
 `,
