@@ -31,11 +31,16 @@ _CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 
 @dataclass(frozen=True)
 class Identity:
-    """Which request a line belongs to; `span_id` is empty where nothing is traced."""
+    """Which request a line belongs to; `span_id` is empty where its trace is not kept."""
 
     trace_id: str
     request_id: str
     span_id: str = ""
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the trace is kept."""
+        return bool(self.span_id)
 
 
 _current: ContextVar[Identity | None] = ContextVar("identity", default=None)

@@ -1,0 +1,172 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import httpx
+import pytest
+from fastapi import FastAPI
+from opentelemetry.sdk.trace import ReadableSpan, TracerProvider
+from opentelemetry.sdk.trace.export import SimpleSpanProcessor
+from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
+from opentelemetry.sdk.trace.sampling import ALWAYS_OFF
+
+from service import stages
+from service.api import tracing
+
+TRACE = "4bf92f3577b34da6a3ce929d0e0e4736"
+PARENT = "00f067aa0ba902b7"
+MESH = {"mesh": ("private-name.obj", b"v 0 0 0 private-data")}
+
+
+@pytest.fixture
+def spans(monkeypatch: pytest.MonkeyPatch) -> InMemorySpanExporter:
+    """Where the spans go of an app that is made from now on."""
+    exporter = InMemorySpanExporter()
+    provider = TracerProvider(shutdown_on_exit=False)
+    provider.add_span_processor(SimpleSpanProcessor(exporter))
+    monkeypatch.setitem(tracing.TELEMETRY, "tracer_provider", provider)
+    return exporter
+
+
+@pytest.fixture
+def traced(
+    spans: InMemorySpanExporter, pretend_app: Callable[..., FastAPI], pretend: Any, serve: Any
+) -> Iterator[httpx.Client]:
+    """A client of a service whose requests are traced; its work has two stages."""
+
+    def work() -> None:
+        with stages.stage("encode"), stages.stage("refine"):
+            pass
+
+    pretend.work = work
+    return serve(pretend_app())
+
+
+def _spans(exporter: InMemorySpanExporter, *names: str) -> list[ReadableSpan]:
+    """All spans, once these have ended: which is after the client has its answer."""
+    end = time.monotonic() + 20
+    while time.monotonic() < end:
+        spans = list(exporter.get_finished_spans())
+        missing = list(names)
+        for span in spans:
+            if span.name in missing:
+                missing.remove(span.name)
+        if not missing:
+            return spans
+        time.sleep(0.002)
+    pytest.fail(f"no spans of {missing}")
+
+
+def test_a_request_is_a_span_and_its_stages_are_children(
+    traced: httpx.Client, spans: InMemorySpanExporter
+) -> None:
+    answer = traced.post("/infer", files=MESH, headers={"traceparent": f"00-{TRACE}-{PARENT}-01"})
+    assert answer.status_code == 200
+    found = {span.name: span for span in _spans(spans, "POST /infer", "encode", "refine")}
+    request = found.pop("POST /infer")
+    assert request.parent is not None
+    assert f"{request.parent.span_id:016x}" == PARENT
+    assert f"{request.context.trace_id:032x}" == TRACE == answer.headers["trace-id"]
+    assert request.attributes is not None
+    assert request.attributes["http.response.status_code"] == 200
+    assert request.attributes["shape_parameters.request_id"] == answer.headers["x-request-id"]
+    assert set(found) <= set(stages.STAGES)
+    for span in found.values():
+        assert span.parent is not None
+        assert span.parent.span_id == request.context.span_id
+        assert request.start_time is not None
+        assert span.start_time is not None
+        assert span.end_time is not None
+        # Two clocks tell when; a millisecond is between them at most.
+        assert request.start_time - 10**6 <= span.start_time <= span.end_time
+    outer, inner = found["encode"], found["refine"]
+    assert outer.start_time is not None
+    assert inner.start_time is not None
+    assert outer.start_time <= inner.start_time
+
+
+def test_without_a_parent_the_trace_is_a_new_one(
+    traced: httpx.Client, spans: InMemorySpanExporter
+) -> None:
+    answer = traced.get("/categories", headers={"traceparent": "nonsense"})
+    (span,) = _spans(spans, "GET /categories")
+    assert f"{span.context.trace_id:032x}" == answer.headers["trace-id"]
+    assert span.parent is None
+
+
+def test_nothing_of_the_clients_is_in_a_span(
+    traced: httpx.Client, spans: InMemorySpanExporter, pretend: Any
+) -> None:
+    traced.post("/infer?api_key=private-key", files=MESH)
+    traced.post("/infer", data={"category": "private-field", "mesh": "private-mesh"})
+
+    def fail() -> None:
+        raise RuntimeError("private-words")
+
+    pretend.work = fail
+    assert traced.post("/infer", files=MESH).status_code == 500
+    told = "".join(span.to_json() for span in _spans(spans, *["POST /infer"] * 3))
+    assert "private" not in told
+
+
+def test_probes_leave_no_span(traced: httpx.Client, spans: InMemorySpanExporter) -> None:
+    for path in ("/livez", "/readyz", "/metrics"):
+        answer = traced.get(path, headers={"traceparent": f"00-{TRACE}-{PARENT}-01"})
+        assert answer.headers["trace-id"] == TRACE
+    assert not spans.get_finished_spans()
+
+
+def test_a_trace_that_is_not_kept_has_an_id_all_the_same(
+    monkeypatch: pytest.MonkeyPatch, pretend_app: Callable[..., FastAPI], serve: Any
+) -> None:
+    exporter = InMemorySpanExporter()
+    provider = TracerProvider(sampler=ALWAYS_OFF, shutdown_on_exit=False)
+    provider.add_span_processor(SimpleSpanProcessor(exporter))
+    monkeypatch.setitem(tracing.TELEMETRY, "tracer_provider", provider)
+    client = serve(pretend_app())
+    answer = client.get("/categories", headers={"traceparent": f"00-{TRACE}-{PARENT}-00"})
+    assert answer.headers["trace-id"] == TRACE
+    assert not exporter.get_finished_spans()
+
+
+def test_a_bucket_names_a_trace_that_is_kept(traced: httpx.Client) -> None:
+    answer = traced.post("/infer", files=MESH)
+    text = traced.get("/metrics", headers={"Accept": "application/openmetrics-text"}).text
+    assert f'trace_id="{answer.headers["trace-id"]}"' in text
+
+
+def test_no_sdk_is_loaded_where_nothing_is_traced() -> None:
+    code = (
+        "import sys; from service.main import create_app; create_app();"
+        "print('opentelemetry.sdk' in sys.modules)"
+    )
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("OTEL")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
+    )
+    assert done.stdout == "False\n"
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        ({}, "shape-parameters"),
+        ({"OTEL_SERVICE_NAME": "mine"}, "mine"),
+        ({"OTEL_RESOURCE_ATTRIBUTES": "team=a,service.name=mine"}, None),
+    ],
+)
+def test_the_service_has_a_name(
+    monkeypatch: pytest.MonkeyPatch, given: dict[str, str], name: str | None
+) -> None:
+    for variable in ("OTEL_SERVICE_NAME", "OTEL_RESOURCE_ATTRIBUTES"):
+        monkeypatch.delenv(variable, raising=False)
+    for variable, value in given.items():
+        monkeypatch.setenv(variable, value)
+    monkeypatch.setattr(os, "environ", dict(os.environ))
+    tracing.name_service()
+    assert os.environ.get("OTEL_SERVICE_NAME") == name
