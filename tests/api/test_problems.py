@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import json
+from contextlib import closing
+from http.client import HTTPConnection
 from typing import Any
 
 import httpx
@@ -64,7 +67,16 @@ def test_a_path_that_is_not_there(client: httpx.Client, problem: Any) -> None:
 
 @pytest.mark.parametrize(
     ("method", "path", "allowed"),
-    [("GET", "/infer", "POST"), ("PUT", "/edit", "POST"), ("DELETE", "/meshes/x", "GET")],
+    [
+        ("GET", "/infer", "POST"),
+        ("PUT", "/edit", "POST"),
+        ("OPTIONS", "/sliders", "POST"),
+        ("DELETE", "/meshes/x", "GET, HEAD"),
+        ("POST", "/livez", "GET, HEAD"),
+        ("POST", "/", "GET, HEAD"),
+        ("FOO", "/docs", "GET, HEAD"),
+        ("TRACE", "/categories", "GET, HEAD"),
+    ],
 )
 def test_a_method_that_is_not_allowed(
     client: httpx.Client, problem: Any, method: str, path: str, allowed: str
@@ -88,3 +100,38 @@ def test_a_malformed_multipart_body(
 ) -> None:
     response = client.post("/infer", content=body, headers={"content-type": content_type})
     problem(response, 400, "body_malformed")
+
+
+@pytest.mark.parametrize(
+    ("target", "status"),
+    [
+        ("/%ff%fe", 404),
+        ("/%00", 404),
+        ("/%f0%9f%aa%91", 404),
+        ("/infer%0d%0aX-Injected:%20yes", 404),
+        ("/categories/%2e%2e%2fsecret", 404),
+        ("/categories/%ed%a0%80", 404),
+        ("/meshes/..%2f..%2fetc%2fpasswd", 404),
+        ("/meshes/%00", 404),
+        ("/" + "a" * 4000, 404),
+        ("/infer/", 404),
+        ("//infer", 404),
+        ("/infer?" + "q=1&" * 1000, 405),
+        ("/livez;a=b", 404),
+        ("*", 404),
+        ("http://elsewhere.example/nowhere", 404),
+    ],
+)
+def test_odd_targets(client: httpx.Client, target: str, status: int) -> None:
+    """Sent as they stand, by what does not tidy them up."""
+    connection = HTTPConnection(client.base_url.host, client.base_url.port, timeout=10)
+    with closing(connection):
+        connection.request("GET", target)
+        response = connection.getresponse()
+        document = json.load(response)
+    assert (response.status, document["status"]) == (status, status)
+    assert response.headers.get_content_type() == "application/problem+json"
+    assert "x-injected" not in response.headers
+    assert "location" not in response.headers
+    assert document["detail"].isprintable()
+    assert len(json.dumps(document)) < 2000
