@@ -68,10 +68,12 @@ def add_stages(record: Record) -> None:
         span.end(_nanoseconds(interval.start + interval.whole))
 
 
-def name_service() -> None:
-    """Call the service by its name in traces, unless the environment has another."""
+def set_defaults() -> None:
+    """Give the environment the service's name and its patience, where it says nothing of them."""
     if "service.name=" not in os.environ.get("OTEL_RESOURCE_ATTRIBUTES", ""):
         os.environ.setdefault("OTEL_SERVICE_NAME", SERVICE_NAME)
+    # In seconds: a collector that is gone holds the end of the process up so long.
+    os.environ.setdefault("OTEL_EXPORTER_OTLP_TIMEOUT", "3")
 
 
 def _nanoseconds(seconds: float) -> int:

@@ -160,13 +160,10 @@ def test_no_sdk_is_loaded_where_nothing_is_traced() -> None:
         ({"OTEL_RESOURCE_ATTRIBUTES": "team=a,service.name=mine"}, None),
     ],
 )
-def test_the_service_has_a_name(
+def test_the_environment_goes_before_the_defaults(
     monkeypatch: pytest.MonkeyPatch, given: dict[str, str], name: str | None
 ) -> None:
-    for variable in ("OTEL_SERVICE_NAME", "OTEL_RESOURCE_ATTRIBUTES"):
-        monkeypatch.delenv(variable, raising=False)
-    for variable, value in given.items():
-        monkeypatch.setenv(variable, value)
-    monkeypatch.setattr(os, "environ", dict(os.environ))
-    tracing.name_service()
+    monkeypatch.setattr(os, "environ", dict(given))
+    tracing.set_defaults()
     assert os.environ.get("OTEL_SERVICE_NAME") == name
+    assert os.environ["OTEL_EXPORTER_OTLP_TIMEOUT"] == "3"
