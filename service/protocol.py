@@ -16,6 +16,7 @@ from service.api.problems import Problem
 if TYPE_CHECKING:
     import asyncio
 
+    from service.api.metrics import Metrics
     from service.server import Config
 
 SPARE = 32
@@ -49,7 +50,7 @@ class Connection(H11Protocol):
         if beyond > SPARE:
             transport.abort()
         elif beyond > 0:
-            self.app = _probes_only(self.app)
+            self.app = _probes_only(self.app, self.config.metrics)
 
     def data_received(self, data: bytes) -> None:
         if self._refused:
@@ -109,6 +110,7 @@ class Connection(H11Protocol):
         if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):
             self.transport.close()
             return
+        self.config.metrics.refuse(code)
         trace_id = secrets.token_hex(16)
         problem = Problem(status, code, detail, "Send a request anew.", trace_id)
         headers = [
@@ -130,7 +132,7 @@ def _over(since: float | None, now: float, seconds: float) -> bool:
     return since is not None and now - since > seconds
 
 
-def _probes_only(app: ASGIApp) -> ASGIApp:
+def _probes_only(app: ASGIApp, metrics: Metrics) -> ASGIApp:
     async def crowded(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["path"] in PROBES:
             await app(scope, receive, send)
@@ -144,6 +146,7 @@ def _probes_only(app: ASGIApp) -> ASGIApp:
             trace_id,
             {"Retry-After": "1", "Connection": "close", "Trace-Id": trace_id},
         )
+        metrics.refuse(problem.code)
         await problem(scope, receive, send)
 
     return crowded

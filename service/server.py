@@ -12,6 +12,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from service.api.context import Context
+from service.api.metrics import Metrics
 from service.protocol import Connection
 from service.settings import Settings
 
@@ -43,6 +44,7 @@ class Config(uvicorn.Config):
         self.body_seconds = settings.body_seconds
         self.drain_seconds = settings.drain_seconds
         self.grace_seconds = settings.grace_seconds
+        self.metrics: Metrics = app.state.context.metrics
 
 
 class Server(uvicorn.Server):
@@ -62,6 +64,8 @@ class Server(uvicorn.Server):
         super().__init__(config)
         self.complete = True
         self._readiness = context.readiness
+        connections = self.server_state.connections
+        config.metrics.connections.set_function(lambda: len(connections))
         self._signalled = False
         self._drained_at: float | None = None
         self._sweeper: asyncio.Task[None] | None = None

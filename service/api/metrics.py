@@ -34,7 +34,11 @@ BYTE_BUCKETS = (*(2.0**power for power in range(10, 28, 2)), 2.0**27)
 
 
 class Metrics:
-    """The instruments of one app, in a registry of its own."""
+    """The instruments of one app, in a registry of its own.
+
+    Attributes:
+        connections: a gauge that the server has look at its own.
+    """
 
     def __init__(self) -> None:
         # When each series began: doubles the series, and nothing asks for it.
@@ -68,6 +72,11 @@ class Metrics:
         self._open = Gauge(
             f"{PREFIX}_open_requests",
             "Requests that have come and are not answered, those that are still sent included.",
+            registry=self.registry,
+        )
+        self.connections = Gauge(
+            f"{PREFIX}_connections",
+            "Connections that are open, idle ones included.",
             registry=self.registry,
         )
         self._problems = self._counter("problems", "Answers that are problems.", "code")
@@ -113,6 +122,10 @@ class Metrics:
         if exchange.code:
             self._problems.labels(exchange.code).inc()
         self._count_report(exchange.report)
+
+    def refuse(self, code: str) -> None:
+        """A connection was answered by the server, in place of the app, with a problem."""
+        self._problems.labels(code).inc()
 
     def _count_report(self, report: Mapping[str, Any]) -> None:
         if "fit" in report:
