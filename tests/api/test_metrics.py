@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import re
+import socket
+import threading
 from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +14,8 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from service.api.metrics import BYTE_BUCKETS, PREFIX, Metrics
 from service.logs import Identity
+from service.server import Config, Server, listen
+from service.settings import Settings
 from service.stages import STAGES, Record
 
 STANDARD = ("process_", "python_")
@@ -150,3 +154,23 @@ def test_odd_requests_make_few_series(pretend_app: Any, serve: Any) -> None:
             assert sample.labels.get("code", "not_found") in {
                 "mesh_id_unknown", "method_not_allowed", "not_found", "unknown_category",
             }  # fmt: skip
+
+
+def test_the_server_tells_of_connections_and_of_what_it_refuses(pretend_app: Any) -> None:
+    app: FastAPI = pretend_app()
+    registry = app.state.context.metrics.registry
+    server = Server(Config(app, Settings()), app.state.context)
+    (listener,) = listen("127.0.0.1", 0)
+    thread = threading.Thread(target=server.run, args=([listener],))
+    thread.start()
+    try:
+        with socket.create_connection(listener.getsockname(), timeout=20) as connection:
+            connection.sendall(b"nonsense\r\n\r\n")
+            assert connection.recv(4096).startswith(b"HTTP/1.1 400 ")
+            assert registry.get_sample_value(f"{PREFIX}_connections") == 1
+    finally:
+        server.should_exit = True
+        thread.join()
+    refused = {"code": "http_malformed"}
+    assert registry.get_sample_value(f"{PREFIX}_problems_total", refused) == 1
+    assert registry.get_sample_value(f"{PREFIX}_connections") == 0
