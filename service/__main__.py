@@ -4,48 +4,57 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import sys
 from collections.abc import Sequence
 
-import uvicorn
 from pydantic import ValidationError
 
+from service import logs
+from service.api import tracing
+from service.api.keys import KeysFault
 from service.main import create_app
+from service.server import Config, Server, listen
 from service.settings import Settings
+from service.store.fault import StoreFault
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Serve until interrupted; the exit status is 2 when a setting makes no sense."""
+    """Serve until SIGTERM or SIGINT.
+
+    The exit status is 0 when all requests were answered before the end, else 1; 1 when the port
+    can't be had, and 2 when a setting makes no sense.
+    """
     parser = argparse.ArgumentParser(prog="python -m service", description=__doc__)
     parser.add_argument("--host", help="address to listen on (HOST, 127.0.0.1)")
     parser.add_argument("--port", help="port to listen on (PORT, 8000)")
     given = {name: value for name, value in vars(parser.parse_args(arguments)).items() if value}
     try:
         settings = Settings(**given)
+        logs.configure(settings.log_level, settings.log_format)
+        tracing.set_defaults()
+        app = create_app(settings)
     except ValidationError as error:
         for line in error.errors():
             name = str(line["loc"][0]).upper()
             print(f"{parser.prog}: {name}={line['input']!r}: {line['msg']}", file=sys.stderr)
         return 2
-    configure_logging(settings.log_level)
-    # log_config=None: uvicorn's lines go through the root logger, like all others.
-    uvicorn.run(
-        create_app(settings),
-        host=settings.host,
-        port=settings.port,
-        log_config=None,
-        server_header=False,
-    )
+    except (KeysFault, StoreFault) as fault:
+        print(f"{parser.prog}: {fault}", file=sys.stderr)
+        return 2
+    try:
+        listeners = listen(settings.host, settings.port)
+    except OSError as error:
+        where = f"{settings.host}:{settings.port}"
+        print(f"{parser.prog}: can't listen on {where} (HOST, PORT): {error}", file=sys.stderr)
+        return 1
+    server = Server(Config(app, settings), app.state.context)
+    server.run(listeners)
+    if not server.complete:
+        # Threads that nobody waits for any more would hold the exit up.
+        logging.shutdown()
+        os._exit(1)
     return 0
-
-
-def configure_logging(level: str) -> None:
-    """One plain line an event, on standard error."""
-    logging.basicConfig(
-        level=level.upper(), format="%(asctime)s %(levelname)s %(name)s: %(message)s"
-    )
-    # It warns of each malformed body, which the client is told of.
-    logging.getLogger("python_multipart").setLevel(logging.ERROR)
 
 
 if __name__ == "__main__":

@@ -11,19 +11,43 @@ import anyio
 from fastapi import FastAPI
 from threadpoolctl import threadpool_limits
 
-from service.api import categories, edit, infer, meshes, openapi, probes, problems, sliders, viewer
+from service.api import (
+    categories,
+    edit,
+    form_limits,
+    infer,
+    meshes,
+    openapi,
+    probes,
+    problems,
+    scrape,
+    sliders,
+    viewer,
+)
+from service.api.admission import Admission, Admit
+from service.api.auth import Auth
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
+from service.api.cors import Cors
+from service.api.failures import Failures
 from service.api.hangup import can_listen, reload_on_hangup
 from service.api.head import Head
-from service.api.quota import cpu_count
+from service.api.keys import Keys
+from service.api.linger import Linger
+from service.api.metrics import Metrics
+from service.api.mirror import Mirror
+from service.api.observe import Observe
+from service.api.pieces import Pieces
+from service.api.quota import cpu_count, memory_bytes
 from service.api.readiness import Readiness
-from service.api.store import MeshStore
-from service.api.trace import Trace
+from service.api.routes import Routes
+from service.api.safety import SafetyHeaders
+from service.api.tracing import TELEMETRY
 from service.api.workers import Workers
 from service.encode.catalog import Catalog
 from service.encode.model import SHIPPED, load_models
-from service.settings import Settings
+from service.settings import MEBIBYTE, Settings
+from service.store.meshstore import MeshStore, open_store
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -41,13 +65,38 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         version=version("shape-parameters"),
         generate_unique_id_function=lambda route: route.name,
         lifespan=_lifespan,
+        form_limits={
+            "max_fields": form_limits.FIELDS,
+            "max_files": form_limits.FILES,
+            "max_part_size": form_limits.FIELD_BYTES,
+        },
+        # The page at /docs is our own: FastAPI's loads its parts from elsewhere.
+        docs_url=None,
+        redoc_url=None,
+        # To send a client elsewhere is to trust its Host header, and to have its key sent there.
+        redirect_slashes=False,
+        telemetry=TELEMETRY,
     )
+    keys = Keys(settings.api_keys.get_secret_value(), settings.api_keys_file)
     app.state.context = _context(settings)
+    app.state.keys = keys
+    app.add_middleware(Admit, admission=app.state.context.admission)
+    app.add_middleware(BodyLimit, limit=settings.max_upload_bytes, seconds=settings.body_seconds)
+    app.add_middleware(Auth, keys=keys)
     app.add_middleware(Head)
-    app.add_middleware(BodyLimit, limit=settings.max_upload_bytes)
-    app.add_middleware(Trace)  # added last: outermost
+    app.add_middleware(Failures)
+    if settings.cors_origins:
+        app.add_middleware(Cors, origins=settings.cors_origins)
+    app.add_middleware(SafetyHeaders)
+    metrics = app.state.context.metrics
+    metrics.registry.register(Mirror(app.state.context))
+    app.add_middleware(Observe, metrics=metrics, routes=Routes(app.routes))
+    app.add_middleware(Pieces)
+    app.add_middleware(Linger)  # added last: outermost
     problems.install(app)
-    for noun in (infer, edit, sliders, categories, meshes, probes, viewer):
+    for noun in (infer, edit, sliders, categories, meshes):
+        app.include_router(noun.router, responses=problems.documented(401))
+    for noun in (probes, scrape, viewer):
         app.include_router(noun.router)
     app.openapi = partial(openapi.document, app)  # type: ignore[method-assign]
     return app
@@ -59,19 +108,32 @@ def _context(settings: Settings) -> Context:
     # Each worker's inference gets its share of the CPUs.
     threads = max(1, cpus // workers)
     body = settings.body_model
-    shipped = partial(load_models, SHIPPED, threads, body)
-    catalog = Catalog(shipped, settings.models_dir, threads, body)
+    shipped = partial(load_models, SHIPPED, threads, body, settings.categories)
+    catalog = Catalog(shipped, settings.models_dir, threads, body, settings.default_models)
     pool = Workers(workers, settings.deadline_seconds)
-    return Context(MeshStore(settings.mesh_cache_bytes), Readiness(catalog.load, pool), pool)
+    queue = workers if settings.queue is None else settings.queue
+    admission = Admission(pool, queue, settings.max_pending_bytes)
+    store = _store(settings)
+    return Context(store, Readiness(catalog.load, pool), pool, admission, Metrics())
+
+
+def _store(settings: Settings) -> MeshStore:
+    memory = settings.mesh_cache_bytes
+    if memory is None:
+        memory = min(256 * MEBIBYTE, memory_bytes() // 8)
+    url = settings.store_url.get_secret_value() if settings.store_url else None
+    return open_store(memory, settings.store_dir, settings.store_bytes, url)
 
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     """Listen at once; the models load meanwhile, and `/readyz` tells when they are there."""
     context: Context = app.state.context
+    app.state.keys.announce()
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(context.readiness.start)
         if can_listen():
-            tasks.start_soon(reload_on_hangup, context.readiness)
+            tasks.start_soon(reload_on_hangup, context.readiness, app.state.keys)
         yield
+        context.store.close()
         tasks.cancel_scope.cancel()

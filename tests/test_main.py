@@ -70,3 +70,36 @@ def test_the_command_serves_on_the_port_that_it_is_told() -> None:
     finally:
         process.terminate()
         process.communicate(timeout=30)
+
+
+def test_meshes_take_an_eighth_of_a_small_containers_memory(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def capacity(memory: int, **settings: Any) -> int:
+        monkeypatch.setattr(main, "memory_bytes", lambda: memory)
+        store = main.create_app(Settings(**settings)).state.context.store
+        return store.memory.capacity
+
+    assert capacity(512 << 20) == 64 << 20
+    assert capacity(64 << 30) == 256 << 20
+    assert capacity(512 << 20, mesh_cache_bytes=5) == 5
+    assert capacity(512 << 20, mesh_cache_bytes=0) == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("STORE_DIR", "/dev/null/store", "STORE_DIR='/dev/null/store' can't be used"),
+        ("STORE_URL", "nowhere://bucket", "STORE_URL=nowhere://... can't be used"),
+    ],
+)
+def test_a_store_that_can_not_be_ends_the_command(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    value: str,
+    words: str,
+) -> None:
+    monkeypatch.setenv(name, value)
+    assert __main__.main([]) == 2
+    assert words in capsys.readouterr().err

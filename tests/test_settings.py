@@ -3,26 +3,34 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from pydantic import ValidationError
+from pydantic import SecretStr, ValidationError
 
 from service.settings import Settings
 
-NAMES = [
-    "HOST",
-    "PORT",
-    "MODELS_DIR",
-    "BODY_MODEL",
-    "MAX_UPLOAD_BYTES",
-    "MESH_CACHE_BYTES",
-    "WORKERS",
-    "DEADLINE_SECONDS",
-    "LOG_LEVEL",
-]
+GIVEN = {
+    "HOST": "0.0.0.0",
+    "PORT": "80",
+    "MODELS_DIR": "/m",
+    "BODY_MODEL": "/b.npz",
+    "MAX_UPLOAD_BYTES": "5",
+    "MESH_CACHE_BYTES": "0",
+    "STORE_DIR": "/s",
+    "STORE_BYTES": "7",
+    "STORE_URL": "s3://bucket",
+    "API_KEYS": "a:0",
+    "API_KEYS_FILE": "/k",
+    "CORS_ORIGINS": "https://a.example, http://b.example:8080/",
+    "WORKERS": "3",
+    "DEADLINE_SECONDS": "2.5",
+    "LOG_LEVEL": "DEBUG",
+    "LOG_FORMAT": "Text",
+}
+"""Every setting in its place, and a value of it."""
 
 
 @pytest.fixture(autouse=True)
 def _bare_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in NAMES:
+    for name in GIVEN:
         monkeypatch.delenv(name, raising=False)
 
 
@@ -30,16 +38,21 @@ def test_the_defaults_serve_this_machine_only() -> None:
     settings = Settings()
     assert (settings.host, settings.port) == ("127.0.0.1", 8000)
     assert settings.max_upload_bytes == 134217728
-    assert settings.mesh_cache_bytes == 268435456
+    assert settings.mesh_cache_bytes is None
+    assert settings.store_dir is None
+    assert settings.store_bytes == 1073741824
+    assert settings.store_url is None
     assert settings.models_dir is None
     assert settings.body_model is None
+    assert settings.api_keys.get_secret_value() == ""
+    assert settings.api_keys_file is None
+    assert settings.cors_origins == ()
     assert settings.workers is None
     assert settings.deadline_seconds == 30
 
 
 def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    values = ["0.0.0.0", "80", "/m", "/b.npz", "5", "0", "3", "2.5", "DEBUG"]
-    for name, value in zip(NAMES, values, strict=True):
+    for name, value in GIVEN.items():
         monkeypatch.setenv(name, value)
     assert Settings() == Settings(
         host="0.0.0.0",
@@ -48,9 +61,16 @@ def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
         body_model=Path("/b.npz"),
         max_upload_bytes=5,
         mesh_cache_bytes=0,
+        store_dir=Path("/s"),
+        store_bytes=7,
+        store_url=SecretStr("s3://bucket"),
+        api_keys=SecretStr("a:0"),
+        api_keys_file=Path("/k"),
+        cors_origins=("https://a.example", "http://b.example:8080"),
         workers=3,
         deadline_seconds=2.5,
         log_level="debug",
+        log_format="text",
     )
     assert Settings().models_dir == Path("/m")
 
@@ -60,9 +80,13 @@ def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ("PORT", "65536"),
         ("MAX_UPLOAD_BYTES", "0"),
+        ("CORS_ORIGINS", "shapes.example"),
+        ("MESH_CACHE_BYTES", "-1"),
+        ("STORE_BYTES", "0"),
         ("WORKERS", "0"),
         ("DEADLINE_SECONDS", "0"),
         ("LOG_LEVEL", "loud"),
+        ("LOG_FORMAT", "xml"),
     ],
 )
 def test_a_value_that_makes_no_sense_is_refused(
@@ -74,5 +98,5 @@ def test_a_value_that_makes_no_sense_is_refused(
 
 
 def test_each_setting_is_explained() -> None:
-    assert [name.upper() for name in Settings.model_fields] == NAMES
+    assert [name.upper() for name in Settings.model_fields] == list(GIVEN)
     assert all(field.description for field in Settings.model_fields.values())

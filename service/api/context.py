@@ -7,18 +7,22 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
+from service.api.admission import Admission
+from service.api.metrics import Metrics
 from service.api.readiness import Readiness
-from service.api.store import MeshStore
 from service.api.workers import Workers
+from service.store.meshstore import MeshStore
 
 
 @dataclass(frozen=True)
 class Context:
-    """The service's state: what is kept, what is loaded, and who works."""
+    """The service's state: what is kept, loaded and measured, who works, and who is let in."""
 
     store: MeshStore
     readiness: Readiness
     workers: Workers
+    admission: Admission
+    metrics: Metrics
 
 
 def context_of(request: Request) -> Context:

@@ -4,27 +4,32 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Form, Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
 from service import pipeline
 from service.api.accept import negotiate
 from service.api.context import Shared
+from service.api.etags import REVALIDATED, named, not_modified, validator, weak
 from service.api.filenames import edited_name
 from service.api.forms import EditForm, form_content_type, upload_of
+from service.api.keeping import EDITED, keep, owner_of
 from service.api.mesh_response import mesh_response
 from service.api.problems import documented
+from service.api.report_response import report_response
 from service.api.schemas import MESH_CONTENT, MESH_HEADERS, EditReport
-from service.api.store import MeshStore
 from service.constraints import NONE, parse_constraints
-from service.edited import Edited
 from service.edits import parse_edits
 from service.encode.model import Model
+from service.errors import NotFound
 from service.requests import Upload
+from service.store.meshstore import MeshStore
 
 JSON = "application/json"
+
+_HEADERS = {**REVALIDATED, "Vary": "Accept"}
 
 router = APIRouter(tags=["shapes"])
 
@@ -62,7 +67,7 @@ router = APIRouter(tags=["shapes"])
             },
         },
         304: {"description": "The client's `If-None-Match` names the edited file."},
-        **documented(400, 404, 413, 415, 422, 500, 503),
+        **documented(400, 404, 408, 413, 415, 422, 429, 500, 503),
     },
 )
 async def edit(
@@ -72,7 +77,7 @@ async def edit(
 ) -> Response:
     upload = await upload_of(request, form, shared.store)
     models = await shared.readiness.models()
-    return await shared.workers.run(_edit, request, form, upload, models, shared.store)
+    return await shared.workers.run(request, _edit, request, form, upload, models, shared.store)
 
 
 def _edit(
@@ -82,34 +87,47 @@ def _edit(
     models: Mapping[str, Model],
     store: MeshStore,
 ) -> Response:
+    inside = validator(request, upload, form, models)
+    if (tag := _held(request, upload, store, inside)) is not None:
+        return not_modified(tag, _HEADERS)
     edits = parse_edits(form.edits) if form.edits is not None else {}
     constraints = parse_constraints(form.constraints) if form.constraints is not None else NONE
     options = form.infer_options(), edits, form.edit_options()
     edited = pipeline.edit(upload, models, *options, constraints)
+    request.state.report = edited.report
     result = Upload(edited.data, edited_name(upload.name, edited.format), edited.media_type)
     accept = ",".join(request.headers.getlist("accept"))
     if negotiate(accept, [edited.media_type, JSON]) == JSON:
-        return JSONResponse(_report(store, upload, result, edited), headers={"Vary": "Accept"})
-    headers = {
-        "Cache-Control": "private, no-cache",
-        "Shape-Parameters": _compact(edited.parameters),
-        "Vary": "Accept",
-    }
-    return mesh_response(request, result, result.mesh_id, headers)
+        warnings = keep(request, store, upload) + keep(request, store, result, EDITED)
+        ids = {"mesh_id": result.mesh_id, "source_mesh_id": upload.mesh_id}
+        inside = _of_report(inside, result.mesh_id)
+        return report_response(request, {**ids, **edited.report}, warnings, inside, _HEADERS)
+    headers = {**_HEADERS, "Shape-Parameters": _compact(edited.parameters)}
+    return mesh_response(request, result, weak(inside), headers)
 
 
-def _report(store: MeshStore, upload: Upload, result: Upload, edited: Edited) -> dict[str, Any]:
-    """The report of an edit, and both of its meshes put into the store."""
-    warnings = list(edited.report["warnings"])
-    store.put(upload)
-    if not store.put(result):
-        warnings.append("The edited mesh is too large to be kept: its mesh_id can't be used.")
-    return {
-        "mesh_id": result.mesh_id,
-        "source_mesh_id": upload.mesh_id,
-        **edited.report,
-        "warnings": warnings,
-    }
+def _held(request: Request, upload: Upload, store: MeshStore, inside: str) -> str | None:
+    """The tag of an answer that the client holds and that would be the same now.
+
+    A report names the edited mesh, which must still be there.  So its tag holds that mesh's id:
+    nothing else knows it before the edit is made again.
+    """
+    for tag in named(request):
+        if tag == inside:
+            return weak(tag)
+        mesh_id = tag.removeprefix(_of_report(inside, ""))
+        if mesh_id != tag:
+            try:
+                store.get(mesh_id, owner_of(request))
+            except NotFound:
+                continue
+            if not keep(request, store, upload):
+                return weak(tag)
+    return None
+
+
+def _of_report(inside: str, mesh_id: str) -> str:
+    return f"{inside}.{mesh_id}"
 
 
 def _compact(parameters: Mapping[str, float]) -> str:

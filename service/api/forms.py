@@ -11,10 +11,11 @@ from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 from starlette.formparsers import MultiPartParser
 
+from service.api.keeping import owner_of
 from service.api.names import parse_names
-from service.api.store import MeshStore
 from service.errors import InvalidRequest, UnsupportedFormat
 from service.requests import EditOptions, InferOptions, SliderOptions, Upload
+from service.store.meshstore import MeshStore
 
 # Uploads are bounded and are read into memory anyway: keep them off the disk, so that a container
 # with a read-only root needs no temporary folder.
@@ -43,7 +44,11 @@ class InferForm(BaseModel):
         Text, Field(description="The id of a mesh that an earlier answer named, in its stead.")
     ] = None
     category: Annotated[
-        str, Field(description="A name that `GET /categories` lists, or `auto`.")
+        str,
+        Field(
+            description="A name that `GET /categories` lists, such as `chair`, or `chair@1.0.0` "
+            "for one version of its model; or `auto`."
+        ),
     ] = "auto"
     up: Annotated[Direction, Field(description="The upload's axis that points up.")] = "auto"
     front: Annotated[
@@ -204,7 +209,7 @@ async def upload_of(request: Request, form: InferForm, store: MeshStore) -> Uplo
 
     Raises:
         InvalidRequest: when it is missing, twofold, or any field is repeated.
-        NotFound: when no mesh is kept under the id.
+        NotFound: when no mesh of the client's is kept under the id.
     """
     names = Counter(name for name, _ in (await request.form()).multi_items())
     repeated = [name for name, count in names.items() if count > 1]
@@ -223,7 +228,7 @@ async def upload_of(request: Request, form: InferForm, store: MeshStore) -> Uplo
     if form.mesh is not None:
         return Upload(await form.mesh.read(), form.mesh.filename, form.mesh.content_type)
     if form.mesh_id is not None:
-        return store.get(form.mesh_id)
+        return await store.fetch(form.mesh_id, owner_of(request))
     raise InvalidRequest(
         "mesh_missing",
         "The form holds no mesh.",

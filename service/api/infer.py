@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Form, Request
-from starlette.responses import JSONResponse
+from starlette.responses import JSONResponse, Response
 
 from service import pipeline
 from service.api.context import Shared
+from service.api.etags import REVALIDATED, named, not_modified, validator, weak
 from service.api.forms import InferForm, form_content_type, upload_of
+from service.api.keeping import keep
 from service.api.problems import documented
-from service.api.schemas import InferReport
-from service.api.store import MeshStore
+from service.api.report_response import report_response
+from service.api.schemas import TAG_HEADERS, InferReport
 from service.encode.model import Model
-from service.requests import InferOptions, Upload
+from service.requests import Upload
+from service.store.meshstore import MeshStore
 
 router = APIRouter(tags=["shapes"])
 
@@ -30,24 +33,35 @@ router = APIRouter(tags=["shapes"])
     dependencies=[Depends(form_content_type)],
     response_class=JSONResponse,
     responses={
-        200: {"model": InferReport, "description": "The parameters and how well they fit."},
-        **documented(400, 404, 413, 415, 422, 500, 503),
+        200: {
+            "model": InferReport,
+            "description": "The parameters and how well they fit.",
+            "headers": TAG_HEADERS,
+        },
+        304: {"description": "The client's `If-None-Match` names the answer."},
+        **documented(400, 404, 408, 413, 415, 422, 429, 500, 503),
     },
 )
 async def infer(
     request: Request,
     form: Annotated[InferForm, Form(media_type="multipart/form-data")],
     shared: Shared,
-) -> JSONResponse:
+) -> Response:
     upload = await upload_of(request, form, shared.store)
     models = await shared.readiness.models()
-    report = await shared.workers.run(_infer, upload, models, form.infer_options(), shared.store)
-    return JSONResponse(report)
+    return await shared.workers.run(request, _infer, request, form, upload, models, shared.store)
 
 
 def _infer(
-    upload: Upload, models: Mapping[str, Model], options: InferOptions, store: MeshStore
-) -> dict[str, Any]:
-    report = pipeline.infer(upload, models, options).report()
-    store.put(upload)
-    return report
+    request: Request,
+    form: InferForm,
+    upload: Upload,
+    models: Mapping[str, Model],
+    store: MeshStore,
+) -> Response:
+    inside = validator(request, upload, form, models)
+    if inside in named(request) and not keep(request, store, upload):
+        return not_modified(weak(inside), REVALIDATED)
+    report = pipeline.infer(upload, models, form.infer_options()).report()
+    request.state.report = report
+    return report_response(request, report, keep(request, store, upload), inside, REVALIDATED)

@@ -8,6 +8,8 @@ from fastapi import APIRouter, Path, Request
 from starlette.responses import Response
 
 from service.api.context import Shared
+from service.api.etags import strong
+from service.api.keeping import owner_of
 from service.api.mesh_response import mesh_response
 from service.api.problems import documented
 from service.api.schemas import MESH_CONTENT, MESH_HEADERS
@@ -35,4 +37,5 @@ async def get_mesh(
     mesh_id: Annotated[str, Path(examples=["sha256-0f4b..."])],
     shared: Shared,
 ) -> Response:
-    return mesh_response(request, shared.store.get(mesh_id), mesh_id, CACHING)
+    mesh = await shared.store.fetch(mesh_id, owner_of(request))
+    return mesh_response(request, mesh, strong(mesh_id), CACHING)

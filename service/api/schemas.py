@@ -16,11 +16,16 @@ Unit = Literal["m", "cm", "mm", "in", "ft", "rad", "1"]
 
 BINARY = {"schema": {"type": "string", "format": "binary"}}
 MESH_CONTENT: dict[str, Any] = dict.fromkeys(MEDIA_TYPES.values(), BINARY)
-MESH_HEADERS: dict[str, Any] = {
+TAG_HEADERS: dict[str, Any] = {
     "ETag": {
-        "description": "Strong: the content's SHA-256, as in a `mesh_id`.",
+        "description": "For `If-None-Match`: strong for what is kept, the `mesh_id`; weak for what "
+        "is computed, the same for the same request to the same models and build.",
         "schema": {"type": "string"},
     },
+}
+
+MESH_HEADERS: dict[str, Any] = {
+    **TAG_HEADERS,
     "Content-Disposition": {
         "description": "`attachment`, with a file name after the upload's.",
         "schema": {"type": "string"},
@@ -200,6 +205,17 @@ class Parameter(Schema):
     """What the paper calls it."""
 
 
+class Version(Schema):
+    """One of the models that a category has."""
+
+    name: str = Field(examples=["chair@1.1.0"])
+    """What to send as `category` for this one."""
+    version: str
+    digest: str
+    default: bool
+    """Whether it is what the bare category means."""
+
+
 class Category(Schema):
     """What `GET /categories/{name}` answers."""
 
@@ -211,6 +227,8 @@ class Category(Schema):
     keep: list[str]
     """Points that an edit can hold in place; the first is the default."""
     parameters: list[Parameter]
+    versions: list[Version]
+    """All of its models, the highest version first."""
 
 
 class Categories(Schema):
@@ -238,6 +256,7 @@ class Ready(Schema):
 
     status: Literal["ready"]
     models: dict[str, ModelIdentity]
+    """What `category` may name: each category, and where it has several models each of them."""
     faults: list[Fault]
     """Models of the operator's own that are not served, or not as they now lie in the folder."""
 

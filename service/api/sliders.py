@@ -10,14 +10,16 @@ from starlette.responses import Response
 
 from service import pipeline
 from service.api.context import Context, Shared
+from service.api.etags import REVALIDATED, named, not_modified, validator, weak
 from service.api.filenames import derived_name
 from service.api.forms import SlidersForm, form_content_type, upload_of
+from service.api.keeping import keep
 from service.api.mesh_response import MEDIA_TYPES, mesh_response
 from service.api.problems import documented
 from service.api.schemas import BINARY, MESH_HEADERS
-from service.api.store import MeshStore
 from service.encode.model import Model
 from service.requests import InferOptions, SliderOptions, Upload
+from service.store.meshstore import MeshStore
 
 GLB = MEDIA_TYPES[".glb"]
 Make = Callable[[Upload, Mapping[str, Model], InferOptions, SliderOptions], bytes]
@@ -29,7 +31,7 @@ def _answers(description: str) -> dict[int | str, dict[str, Any]]:
     return {
         200: {"description": description, "content": {GLB: BINARY}, "headers": MESH_HEADERS},
         304: {"description": "The client's `If-None-Match` names the answer."},
-        **documented(400, 404, 413, 415, 422, 500, 503),
+        **documented(400, 404, 408, 413, 415, 422, 429, 500, 503),
     }
 
 
@@ -82,7 +84,7 @@ async def _answer(
     upload = await upload_of(request, form, shared.store)
     models = await shared.readiness.models()
     run = shared.workers.run
-    return await run(_made, request, form, upload, models, shared.store, make, suffix)
+    return await run(request, _made, request, form, upload, models, shared.store, make, suffix)
 
 
 def _made(
@@ -94,7 +96,11 @@ def _made(
     make: Make,
     suffix: str,
 ) -> Response:
+    inside = validator(request, upload, form, models)
+    if inside in named(request):
+        keep(request, store, upload)
+        return not_modified(weak(inside), REVALIDATED)
     data = make(upload, models, form.infer_options(), form.slider_options())
-    store.put(upload)
+    keep(request, store, upload)
     result = Upload(data, derived_name(upload.name, suffix, "glb"), GLB)
-    return mesh_response(request, result, result.mesh_id, {"Cache-Control": "private, no-cache"})
+    return mesh_response(request, result, weak(inside), REVALIDATED)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX, Discriminator
 from service.encode.session import EncoderSession
+from service.encode.session import file_digest as file_digest
 from service.errors import ModelFault
 from service.mesh.surface import Normalization, Samples, Surface
 
@@ -53,6 +56,8 @@ class Model(ABC):
     turns_freely: ClassVar[bool]
     """Whether a fit finds by itself how a shape is turned: then there is no lean to take out, and
     one orientation is as good to begin with as another."""
+    recognised: ClassVar[bool] = True
+    """Whether `auto` may take an upload for one of the category."""
 
     def __init__(self, card: Mapping[str, Any], path: Path, threads: int):
         """
@@ -62,16 +67,17 @@ class Model(ABC):
             threads: that one encoding may use.
 
         Raises:
-            ModelFault: for a network that can't be read.
+            ModelFault: for a network that is not the card's, or can't be read.
             KeyError: for what the card lacks.
         """
         self.card = card
         self.name: str = card["name"]
         self.version: str = card["version"]
         self.digest: str = card["digest"]
-        self._path = path
-        self._session = EncoderSession(path, threads)
-        self.discriminator = Discriminator(path.with_suffix(DISCRIMINATOR_SUFFIX), threads)
+        self._session = EncoderSession(path, threads, self.digest)
+        self.discriminator = Discriminator(
+            path.with_suffix(DISCRIMINATOR_SUFFIX), threads, card["discriminator"]["digest"]
+        )
 
     @property
     @abstractmethod
@@ -87,6 +93,11 @@ class Model(ABC):
     def stands(self) -> bool:
         """Shapes of the category stand on a floor."""
         return self.keeps[0] == "floor"
+
+    @property
+    @abstractmethod
+    def outputs(self) -> int:
+        """How many numbers the encoder has to answer."""
 
     @abstractmethod
     def entries(self) -> list[dict[str, Any]]:
@@ -135,15 +146,18 @@ class Model(ABC):
         return float(min(near, alike))
 
     def verify(self) -> None:
-        """Check the files' digests, and a golden request against its recorded answer.
+        """Put a golden request to the encoder: it must answer as the card has recorded.
 
         Raises:
-            ModelFault: when either differs.
+            ModelFault: when it does not.
         """
-        discriminator = self._path.with_suffix(DISCRIMINATOR_SUFFIX)
-        require_digest(self._path, self.digest)
-        require_digest(discriminator, self.card["discriminator"]["digest"])
         answer = self._session.run(self.golden_cloud())
+        if answer.shape != (self.outputs,):
+            raise ModelFault(
+                "model_shape",
+                f"the encoder of {self.name} answers {answer.size} numbers, not {self.outputs}",
+                "Install the encoder and the template from the same export.",
+            )
         golden = np.array(self.card.get("golden", []))
         gap = float(np.abs(answer - golden).max()) if golden.shape == answer.shape else np.inf
         if not gap < GOLDEN_TOLERANCE:
@@ -158,6 +172,17 @@ class Model(ABC):
         """Which model it is."""
         return {"name": self.name, "version": self.version, "digest": self.digest}
 
+    @property
+    def template_digest(self) -> str | None:
+        """Digest of the template, where the card tells it."""
+        return self.card.get("template_digest")
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Digest, in hex, of what its answers depend on: its card, networks and template."""
+        facts = json.dumps([self.card, self.template_digest], sort_keys=True)
+        return hashlib.sha256(facts.encode()).hexdigest()
+
     def describe(self) -> dict[str, Any]:
         """What `GET /categories/{name}` says."""
         return {
@@ -168,19 +193,3 @@ class Model(ABC):
             "keep": list(self.keeps),
             "parameters": self.entries(),
         }
-
-
-def require_digest(path: Path, expected: str) -> None:
-    """Raise `ModelFault` for a file that is not the one that its card speaks of."""
-    digest = file_digest(path)
-    if digest != expected:
-        raise ModelFault(
-            "model_digest",
-            f"{path.name} is {digest}, its card says {expected}",
-            "Install the model files and their card from the same export.",
-        )
-
-
-def file_digest(path: Path) -> str:
-    """``sha256-<hex>`` of a file."""
-    return f"sha256-{hashlib.sha256(path.read_bytes()).hexdigest()}"

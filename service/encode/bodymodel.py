@@ -9,10 +9,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from service.encode.basemodel import Model, require_digest
+from service.encode.basemodel import Model
 from service.encode.bodyestimate import BodyEstimate, estimate_body
 from service.encode.bodymesh import estimate_mesh
-from service.encode.bodyoutputs import ANCHORS, BodyEncoding, spread_first
+from service.encode.bodyoutputs import ANCHORS, OUTPUTS, BodyEncoding, spread_first
 from service.encode.meshencoder import MESH_SUFFIX, MeshEncoder
 from service.mesh.surface import Normalization, Samples, Surface
 from service.template.anatomy import GROUPS, JOINTS, limits
@@ -46,7 +46,14 @@ class BodyModel(Model):
         self.mesh_encoder: MeshEncoder | None = None
         # It knows the vertices of the body that it was trained with, and of no other.
         if "mesh_encoder" in card and not self.other_body:
-            self.mesh_encoder = MeshEncoder(path.with_suffix(MESH_SUFFIX), template, threads)
+            digest = card["mesh_encoder"]["digest"]
+            mesh_path = path.with_suffix(MESH_SUFFIX)
+            self.mesh_encoder = MeshEncoder(mesh_path, template, threads, digest)
+
+    @property
+    def template_digest(self) -> str:
+        """Digest of the body at work, which may be another than the card's."""
+        return self.template.digest
 
     @property
     def label(self) -> str:
@@ -55,6 +62,10 @@ class BodyModel(Model):
     @property
     def keeps(self) -> tuple[str, ...]:
         return KEEPS
+
+    @property
+    def outputs(self) -> int:
+        return OUTPUTS
 
     @property
     def other_body(self) -> bool:
@@ -91,12 +102,6 @@ class BodyModel(Model):
             return estimate_body(self, samples, refined, rough, surface.metre)
         vertices, metre = surface.canonical, surface.metre
         return estimate_mesh(self.template, encoder, vertices, samples, refined, metre)
-
-    def verify(self) -> None:
-        super().verify()
-        if self.mesh_encoder is not None:
-            path = self._path.with_suffix(MESH_SUFFIX)
-            require_digest(path, self.card["mesh_encoder"]["digest"])
 
     def golden_cloud(self) -> NDArray[np.float32]:
         return golden_cloud(self._session.points)

@@ -25,6 +25,7 @@ class PretendModel:
     name = "stool"
     version = "1"
     digest = "sha256-00"
+    fingerprint = "00"
 
     def __init__(self, fault: ModelFault | None = None) -> None:
         self.fault = fault

@@ -16,6 +16,7 @@ from fastapi import FastAPI
 
 from service.api.mesh_response import MEDIA_TYPES
 from service.api.schemas import EditReport
+from service.store.memory import OVERHEAD
 
 MESH = ("my chair.obj", b"abc")
 EDITS = {"edits": '{"seat_width": 0.5}'}
@@ -53,7 +54,7 @@ def test_the_report_names_both_meshes_and_both_are_kept(client: httpx.Client) ->
 
 
 def test_an_edit_too_large_to_keep_says_so(pretend_app: Callable[..., FastAPI], serve: Any) -> None:
-    client = serve(pretend_app(mesh_cache_bytes=5))
+    client = serve(pretend_app(mesh_cache_bytes=OVERHEAD + 5))
     headers = {"accept": "application/json"}
     report = client.post("/edit", files={"mesh": MESH}, data=EDITS, headers=headers).json()
     assert "too large" in report["warnings"][-1]

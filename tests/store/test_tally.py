@@ -28,4 +28,4 @@ def test_a_complaint_is_made_once_in_a_while(
         complaints.say("can't write", OSError("full"))
     first, second = (record.getMessage() for record in caplog.records)
     assert first == "the disk store can't write: OSError: full"
-    assert second == "the disk store can't write (3 more since the last time): OSError: full"
+    assert second == "the disk store can't write: OSError: full (3 more since the last time)"
