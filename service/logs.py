@@ -28,6 +28,8 @@ LONGEST = 8000
 # Line ends and terminal sequences, in ASCII and beyond.
 _CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 
+_encode = json.JSONEncoder(separators=(",", ":"), default=str).encode
+
 
 @dataclass(frozen=True)
 class Identity:
@@ -103,7 +105,7 @@ class Json(logging.Formatter):
         line |= getattr(record, FIELDS, {})
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)[-LONGEST:]
-        return json.dumps(line, separators=(",", ":"), default=str)
+        return _encode(line)
 
 
 class Text(logging.Formatter):
