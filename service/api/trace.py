@@ -1,25 +1,23 @@
-"""One id a request, from its `traceparent` (W3C Trace Context) or fresh, in every answer."""
+"""The ids of a request, from its headers or fresh, as every answer names them.
+
+A trace's id is that of `traceparent` (W3C Trace Context), and all calls of one task share it; a
+request's own is that of `X-Request-Id`, as proxies send it.
+"""
 
 from __future__ import annotations
 
-import logging
 import re
 import secrets
 
-from starlette.datastructures import Headers, MutableHeaders
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
-
-from service.api.problems import internal_error
-
-HEADER = "Trace-Id"
-
-logger = logging.getLogger(__name__)
+TRACE_HEADER = "Trace-Id"
+REQUEST_HEADER = "X-Request-Id"
 
 # Later versions may append fields; version 00 has exactly four.
 _TRACEPARENT = re.compile(
     "(?P<version>[0-9a-f]{2})-(?P<trace>[0-9a-f]{32})-(?P<parent>[0-9a-f]{16})-[0-9a-f]{2}"
     "(?P<rest>-.*)?"
 )
+_REQUEST_ID = re.compile("[A-Za-z0-9][A-Za-z0-9._:/+=@-]{0,127}")
 
 
 def trace_id(traceparent: str | None) -> str:
@@ -40,35 +38,8 @@ def _valid(match: re.Match[str]) -> bool:
     )
 
 
-class Trace:
-    """Middleware: sets ``request.state.trace_id``, names it in the answer, and catches the rest.
-
-    An error that no handler knows is logged with its trace id and answered with a 500 problem
-    that tells nothing of the inside.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        identity = trace_id(Headers(scope=scope).get("traceparent"))
-        scope.setdefault("state", {})["trace_id"] = identity
-        started = False
-
-        async def traced(message: Message) -> None:
-            nonlocal started
-            if message["type"] == "http.response.start":
-                started = True
-                MutableHeaders(scope=message)[HEADER] = identity
-            await send(message)
-
-        try:
-            await self.app(scope, receive, traced)
-        except Exception:
-            logger.exception("%s %s failed, trace %s", scope["method"], scope["path"], identity)
-            if started:
-                raise
-            await internal_error(identity)(scope, receive, traced)
+def request_id(given: str | None) -> str:
+    """The header's value where it is one that can't do harm, else 32 fresh hex digits."""
+    if given and _REQUEST_ID.fullmatch(given):
+        return given
+    return secrets.token_hex(16)
