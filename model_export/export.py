@@ -29,7 +29,7 @@ from service.encode.discriminator import DISCRIMINATOR_SUFFIX
 from service.encode.model import AffineModel, file_digest, golden_cloud
 from service.encode.session import EncoderSession
 from service.template.affine import AffineTemplate
-from service.template.loader import load_template
+from service.template.loader import load_template, template_path
 
 TOLERANCE = 1e-4
 FULL = {"refit": 4000, "count": 1000, "steps": 1500}
@@ -186,8 +186,7 @@ def main() -> None:
     gap = check_onnx(encoder, path, random_clouds(template.points, 20) + clouds)
     print(f"onnxruntime and torch differ by {gap:.1e} over {20 + len(clouds)} clouds")
     card = build_card(template, state, path, arguments.version)
-    if isinstance(source, Path):
-        card["template_digest"] = file_digest(source)
+    card["template_digest"] = file_digest(template_path(source))
     card["training"]["refit_shapes"] = arguments.refit
     card["data"] = describe_data(shapes)
     data = Data(shapes, arguments.others, arguments.but)

@@ -40,6 +40,10 @@ class AffineModel(Model):
         return tuple(self.template.anchors)
 
     @property
+    def outputs(self) -> int:
+        return len(self.template.parameters) + 3 + len(self.template.present)
+
+    @property
     def sigma_scale(self) -> NDArray[np.float64]:
         """``[d]`` what a fit's own standard deviations are multiplied by to be honest."""
         scales = self.card.get("calibration", {}).get("sigma_scale", {})

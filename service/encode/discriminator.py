@@ -19,16 +19,17 @@ DISCRIMINATOR_SUFFIX = ".discriminator.onnx"
 class Discriminator:
     """A loaded network: views of a cloud in, the log odds of each in one call out."""
 
-    def __init__(self, path: Path, threads: int = 1) -> None:
+    def __init__(self, path: Path, threads: int = 1, digest: str | None = None) -> None:
         """
         Args:
             path: the ONNX file.
             threads: that one call may use.
+            digest: of the file, see `open_session`.
 
         Raises:
             ModelFault: when the file is no such network.
         """
-        self._session = open_session(path, threads)
+        self._session = open_session(path, threads, digest)
         self.points = cloud_size(self._session, path, single=False)
 
     def odds(

@@ -27,17 +27,20 @@ TORSO = ("pelvis", "spine1", "spine2", "spine3")
 class MeshEncoder:
     """A loaded network: the template's vertices in their order in, rotations and shape out."""
 
-    def __init__(self, path: Path, template: SkinnedTemplate, threads: int = 1) -> None:
+    def __init__(
+        self, path: Path, template: SkinnedTemplate, threads: int = 1, digest: str | None = None
+    ) -> None:
         """
         Args:
             path: the ONNX file.
             template: the body that it was trained with.
             threads: that one encoding may use.
+            digest: of the file, see `open_session`.
 
         Raises:
             ModelFault: when the file is no such network, or takes another number of vertices.
         """
-        self._session = open_session(path, threads)
+        self._session = open_session(path, threads, digest)
         self._template = template
         self._faces = faces_digest(template.faces)
         shape = self._session.get_inputs()[0].shape

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +15,22 @@ from service.encode.basemodel import STEEPNESS as STEEPNESS
 from service.encode.basemodel import Model as Model
 from service.encode.basemodel import file_digest as file_digest
 from service.encode.bodymodel import BodyModel as BodyModel
+from service.encode.card import read_card, unreadable
+from service.encode.debugmodel import DebugModel as DebugModel
 from service.encode.estimate import SIGMA_FLOOR as SIGMA_FLOOR
 from service.errors import ModelFault
+from service.shipped import SHIPPED as SHIPPED
 from service.template.bodyfile import BodyFileError, load_body
-from service.template.loader import load_template
-
-SHIPPED = Path(__file__).parent.parent / "models"
-"""The folder of the models that come with the service."""
+from service.template.loader import load_template, template_path
 
 
-def load_models(directory: Path, threads: int = 1, body: Path | None = None) -> dict[str, Model]:
-    """Every model of a folder: ``<name>.json`` cards with ``<name>.onnx`` beside them.
+def load_models(
+    directory: Path,
+    threads: int = 1,
+    body: Path | None = None,
+    names: Collection[str] | None = None,
+) -> dict[str, Model]:
+    """The models of a folder: ``<name>.json`` cards with ``<name>.onnx`` beside them.
 
     A ``<name>.yaml`` there is an affine category's template; without one it is a built-in's.
 
@@ -34,11 +38,14 @@ def load_models(directory: Path, threads: int = 1, body: Path | None = None) -> 
         directory: the folder.
         threads: that one encoding may use.
         body: file of the body that skinned models work with, see `load_body`.
+        names: of those that are wanted; by default all.
 
     Raises:
         ModelFault: for a card, network, template or body that can't be read.
     """
-    models = (load_model(path, threads, body) for path in sorted(directory.glob("*.json")))
+    cards = sorted(directory.glob("*.json"))
+    wanted = [card for card in cards if names is None or card.stem in names]
+    models = [load_model(card, threads, body) for card in wanted]
     return {model.name: model for model in models}
 
 
@@ -49,32 +56,33 @@ def load_model(path: Path, threads: int = 1, body: Path | None = None) -> Model:
         ModelFault: for a card, network, template or body that can't be read, or a template that is
             not the one that the card speaks of.
     """
+    card = read_card(path)
     try:
-        card = json.loads(path.read_text("utf-8"))
-        kind = card.get("kind", AffineModel.kind)
-        if kind == BodyModel.kind:
-            return _skinned(card, path, threads, body)
-        if kind == AffineModel.kind:
-            return _affine(card, path, threads)
-        raise ValueError(f"its kind is {kind!r}, not {AffineModel.kind} or {BodyModel.kind}")
+        match card.get("kind", AffineModel.kind):
+            case BodyModel.kind:
+                return _skinned(card, path, threads, body)
+            case AffineModel.kind:
+                return _affine(AffineModel, card, path, threads)
+            case DebugModel.kind:
+                return _affine(DebugModel, card, path, threads)
+            case kind:
+                raise unreadable(path, f"its kind is {kind!r}, which this service does not know")
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ModelFault(
-            "model_unreadable",
-            f"{path.name} can't be loaded: {error}",
-            "Export the model again, or remove it from the models folder.",
-        ) from error
+        raise unreadable(path, str(error)) from error
 
 
-def _affine(card: Mapping[str, Any], path: Path, threads: int) -> AffineModel:
-    own = path.with_suffix(".yaml")
-    template = load_template(template_source(path, card["name"]))
-    if own.is_file() and card.get("template_digest", file_digest(own)) != file_digest(own):
+def _affine(
+    kind: type[AffineModel], card: Mapping[str, Any], path: Path, threads: int
+) -> AffineModel:
+    source = template_path(template_source(path, card["name"]))
+    expected = card.get("template_digest")
+    if expected is not None and source.is_file() and file_digest(source) != expected:
         raise ModelFault(
             "template_digest",
-            f"{own.name} is not the template that {path.name} was trained on",
+            f"{source.name} is not the template that {path.name} was trained on",
             "Train the changed template, or put back the one from the same export.",
         )
-    return AffineModel(card, template, path.with_suffix(".onnx"), threads)
+    return kind(card, load_template(source), path.with_suffix(".onnx"), threads)
 
 
 def _skinned(card: Mapping[str, Any], path: Path, threads: int, body: Path | None) -> BodyModel:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +12,45 @@ from numpy.typing import NDArray
 from service.errors import ModelFault
 
 
-def open_session(path: Path, threads: int) -> onnxruntime.InferenceSession:
-    """A session of an ONNX file whose runs take ``threads`` threads.
+def file_digest(path: Path) -> str:
+    """``sha256-<hex>`` of a file."""
+    with path.open("rb") as file:
+        return f"sha256-{hashlib.file_digest(file, 'sha256').hexdigest()}"
+
+
+def require_digest(path: Path, expected: str) -> None:
+    """Raise `ModelFault` for a file that is missing, or not the one that its card speaks of."""
+    if not path.is_file():
+        raise ModelFault(
+            "model_file_missing",
+            f"{path.name} is missing",
+            "Install all files of the model from the same export.",
+        )
+    digest = file_digest(path)
+    if digest != expected:
+        raise ModelFault(
+            "model_digest",
+            f"{path.name} is {digest}, its card says {expected}",
+            "Install the model files and their card from the same export; if they were just being "
+            "copied, reload when the copy is complete.",
+        )
+
+
+def open_session(
+    path: Path, threads: int, digest: str | None = None
+) -> onnxruntime.InferenceSession:
+    """A session of an ONNX file.
+
+    Args:
+        path: the file.
+        threads: that each run takes.
+        digest: of the file as it should be; another one is not even parsed.
 
     Raises:
-        ModelFault: when the file is no network.
+        ModelFault: when the file is missing, altered, or no network.
     """
+    if digest is not None:
+        require_digest(path, digest)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
@@ -27,9 +61,8 @@ def open_session(path: Path, threads: int) -> onnxruntime.InferenceSession:
     options.enable_cpu_mem_arena = False
     options.log_severity_level = 3
     try:
-        return onnxruntime.InferenceSession(
-            path.read_bytes(), options, providers=["CPUExecutionProvider"]
-        )
+        # By its path: a session keeps the bytes that it is given for as long as it lives.
+        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except Exception as error:
         raise ModelFault(
             "model_unreadable",
@@ -59,16 +92,17 @@ class EncoderSession:
     """A loaded encoder: one cloud of a fixed size in; parameters, translation and the log odds of
     the template's variants, where it has any, out."""
 
-    def __init__(self, path: Path, threads: int = 1) -> None:
+    def __init__(self, path: Path, threads: int = 1, digest: str | None = None) -> None:
         """
         Args:
             path: the ONNX file.
             threads: that one encoding may use.
+            digest: of the file, see `open_session`.
 
         Raises:
             ModelFault: when the file is no such network.
         """
-        self._session = open_session(path, threads)
+        self._session = open_session(path, threads, digest)
         self.points = cloud_size(self._session, path, single=True)
 
     def run(self, points: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,9 @@ from service.template.affine import AffineTemplate
 from service.template.expressions import ExpressionError, parse_affine, parse_rows
 from service.template.parameters import Derived, Parameter
 from service.template.parts import Part, PartError, read_parts
+
+BUILT_IN = Path(__file__).parent
+"""The folder of the categories' templates that come with the service."""
 
 
 class TemplateError(ValueError):
@@ -30,17 +32,20 @@ def load_template(source: str | Path) -> AffineTemplate:
     Raises:
         TemplateError: for a missing file or entry, or an expression that is not affine.
     """
-    if isinstance(source, str) and not source.endswith((".yaml", ".yml")):
-        file = resources.files("service.template") / f"{source}.yaml"
-        if not file.is_file():
-            raise TemplateError(f"there is no built-in template named {source!r}")
-        text = file.read_text("utf-8")
-        return compile_template(yaml.safe_load(text))
+    path = template_path(source)
+    if path.parent == BUILT_IN and not path.is_file():
+        raise TemplateError(f"there is no built-in template named {path.stem!r}")
     try:
-        spec = yaml.safe_load(Path(source).read_text("utf-8"))
+        spec = yaml.safe_load(path.read_text("utf-8"))
     except (OSError, ValueError, yaml.YAMLError) as error:
         raise TemplateError(f"{source} can't be read: {error}") from error
     return compile_template(spec)
+
+
+def template_path(source: str | Path) -> Path:
+    """The file of a template that is named as for `load_template`."""
+    built_in = isinstance(source, str) and not source.endswith((".yaml", ".yml"))
+    return BUILT_IN / f"{source}.yaml" if built_in else Path(source)
 
 
 def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:

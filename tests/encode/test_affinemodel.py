@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from six_boxes import ANSWER, SIX_BOXES
+from six_boxes import ANSWER, SIX_BOXES, rewrite
 
 from service.encode.affinemodel import golden_cloud
 from service.encode.affineoutputs import SMALLEST
-from service.encode.model import AffineModel, load_models
+from service.encode.model import AffineModel, file_digest, load_models
 from service.mesh.surface import Normalization
 from service.template.affine import AffineTemplate
 from service.template.loader import load_template
@@ -29,7 +29,8 @@ def test_encoding_splits_the_answer_and_keeps_sizes_positive(folder: Path) -> No
 def test_the_rest_of_the_answer_is_the_odds_of_the_variants(
     folder: Path, write_network: Any
 ) -> None:
-    write_network(folder / "chair.onnx", [*ANSWER, 0.1, 0.2, 0.3], (1, 100, 3))
+    network = write_network(folder / "chair.onnx", [*ANSWER, 0.1, 0.2, 0.3], (1, 100, 3))
+    rewrite(folder, digest=file_digest(network))
     variants = "\nvariants:\n  a: {}\n  b: {without: [back]}\n  c: {}\n"
     (folder / "chair.yaml").write_text(SIX_BOXES + variants, "utf-8")
     model = load_models(folder)["chair"]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.encode.session import EncoderSession
+from service.encode.session import EncoderSession, file_digest
 from service.errors import ModelFault
 
 
@@ -39,6 +39,20 @@ def test_a_network_of_another_shape_is_refused(
         EncoderSession(path)
     assert caught.value.code == "model_shape"
     assert caught.value.detail.startswith("odd.onnx takes ")
+
+
+def test_a_file_with_another_digest_is_not_even_parsed(tmp_path: Path, write_network: Any) -> None:
+    path = write_network(tmp_path / "a.onnx", [])
+    assert EncoderSession(path, digest=file_digest(path)).points == 50
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(ModelFault) as caught:
+        EncoderSession(path, digest="sha256-00")
+    assert caught.value.code == "model_digest"
+    assert caught.value.detail == f"a.onnx is {file_digest(path)}, its card says sha256-00"
+    path.unlink()
+    with pytest.raises(ModelFault) as caught:
+        EncoderSession(path, digest="sha256-00")
+    assert caught.value.code == "model_file_missing"
 
 
 @pytest.mark.parametrize("content", [b"", b"no network", None])
