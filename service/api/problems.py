@@ -10,8 +10,11 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
+from starlette.types import Receive, Scope, Send
 
 from service.api.field_errors import explain
+from service.api.form_limits import overrun
+from service.api.left import ClientLeft, to_nobody
 from service.errors import (
     InvalidMesh,
     InvalidRequest,
@@ -48,16 +51,21 @@ _PLAIN: dict[int, tuple[str, str]] = {
     400: ("body_malformed", "Send multipart/form-data, as `curl -F mesh=@chair.glb` does."),
     404: ("not_found", "The calls are listed at /docs and in /openapi.json."),
     405: ("method_not_allowed", "Use a method that the Allow header names; see /docs."),
+    408: ("body_too_slow", "Send it again; over a slow network send less, such as a zip."),
     413: ("body_too_large", "Send a smaller file, or ask the operator to raise MAX_UPLOAD_BYTES."),
+    429: ("overloaded", "Send the request again after as many seconds as Retry-After says."),
 }
 
 _WHAT: dict[int, str] = {
     400: "The body is not well-formed multipart.",
+    401: "The service wants an API key, and this is none that it knows.",
     404: "There is no such category, mesh or path.",
+    408: "The body came too slowly.",
     413: "The upload is over a limit.",
     415: "The format can't be read, or can't be carried through without loss.",
     422: "The mesh is broken or too complex, or an option or edit makes no sense; `code` and "
     "`detail` say which.",
+    429: "The service is at work on as much as it takes; `Retry-After` says when to come again.",
     500: "The service failed; nothing about the inside is told.",
     503: "The models are still loading, one of them can't be trusted, or the service is too busy.",
 }
@@ -92,6 +100,12 @@ class Problem(JSONResponse):
             **(members or {}),
         }
         super().__init__(document, status_code=status, headers=headers)
+        self.code = code
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer with it, and note its code where the request's line in the log finds it."""
+        scope.setdefault("state", {})["code"] = self.code
+        await super().__call__(scope, receive, send)
 
 
 def internal_error(trace_id: str) -> Problem:
@@ -122,15 +136,24 @@ async def _shape_error(request: Request, error: Exception) -> Problem:
 
 async def _http_error(request: Request, error: Exception) -> Problem:
     assert isinstance(error, HTTPException)
+    return from_http(request.scope, error)
+
+
+def from_http(scope: Scope, error: HTTPException) -> Problem:
+    """The framework's error as an answer; middleware answers with it directly."""
     status = error.status_code
     code, suggestion = _PLAIN.get(status, (HTTPStatus(status).name.lower(), "See /docs."))
     detail = error.detail
-    if status == 404:
-        detail = f"There is nothing at {request.url.path[:200]!r}."
-    elif status == 405:
-        detail = f"{request.method} is not a method of {request.url.path[:200]!r}."
     headers = dict(error.headers or {})
-    return Problem(status, code, detail, suggestion, request.state.trace_id, headers)
+    if status == 400 and (told := overrun(detail)) is not None:
+        status, code, suggestion = told
+    elif status == 404:
+        detail = f"There is nothing at {scope['path'][:200]!r}."
+    elif status == 405:
+        detail = f"{scope['method']} is not a method of {scope['path'][:200]!r}."
+        if headers.get("Allow") == "GET":
+            headers["Allow"] = "GET, HEAD"
+    return Problem(status, code, detail, suggestion, scope["state"]["trace_id"], headers)
 
 
 async def _validation_error(request: Request, error: Exception) -> Problem:
@@ -140,9 +163,10 @@ async def _validation_error(request: Request, error: Exception) -> Problem:
 
 
 def install(app: FastAPI) -> None:
-    """Answer all errors that a handler can see with problems; `Trace` answers the rest."""
+    """Answer all errors that a handler can see with problems; `Failures` answers the rest."""
     app.add_exception_handler(ShapeError, _shape_error)
     app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(ClientLeft, to_nobody)
     app.add_exception_handler(RequestValidationError, _validation_error)
 
 
