@@ -44,7 +44,8 @@ class Request:
     @property
     def bytes(self) -> int:
         """That are held for it."""
-        return self.declared if not self.whole and self._prompt else self.received
+        promised = self.declared if self._prompt else 0
+        return self.received if self.whole else max(self.received, promised)
 
 
 class Admission:
