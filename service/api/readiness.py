@@ -25,17 +25,27 @@ class Readiness:
 
     A request takes the models as they are when it comes and works with those to its end, whatever
     is reloaded meanwhile.
+
+    Attributes:
+        draining: whether the service is about to stop.
+        reloads: how often the models were loaded anew, by result.
     """
 
     def __init__(self, load: Load, workers: Workers) -> None:
         """`load` finds verified models; it may be called again, but never twice at once."""
         self._load = load
         self._workers = workers
+        self.draining = False
+        self.reloads = {"success": 0, "failure": 0}
         self._started = False
         self._installed: Installed | None = None
         self._fault: ShapeError | None = None
         self._done = anyio.Event()
         self._reloading = anyio.Lock()
+
+    def drain(self) -> None:
+        """The service is about to stop: `/readyz` says so; requests are still served."""
+        self.draining = True
 
     async def start(self) -> None:
         """Load every model and put its golden request to it, in a worker thread."""
@@ -56,26 +66,26 @@ class Readiness:
     async def reload(self) -> None:
         """Load the models anew; on any failure those from before are kept."""
         await self._done.wait()
+        result = "failure"
         try:
             self._installed = await self._look()
             self._fault = None
+            result = "success"
         except ShapeError as error:
             logger.error("not reloaded: %s", error)
         except Exception:
             logger.exception("not reloaded")
+        finally:
+            self.reloads[result] += 1
 
     async def _look(self) -> Installed:
         async with self._reloading:
-            installed = await self._workers.run(self._load)
+            installed = await self._workers.run(None, self._load)
         for fault in installed.faults:
             logger.error("not served: %s", fault)
         if not installed.models:
-            raise ModelFault(
-                "model_fault",
-                "No model is installed.",
-                "Point MODELS_DIR at a folder that holds <category>.onnx and <category>.json.",
-            )
-        models = installed.models.values()
+            raise _nothing_to_serve(installed)
+        models = [model for several in installed.versions.values() for model in several]
         logger.info("ready: %s", ", ".join(f"{m.name} {m.version}" for m in models))
         return installed
 
@@ -98,15 +108,15 @@ class Readiness:
 
     @property
     def names(self) -> list[str]:
-        """The categories, sorted; none until they can be served."""
-        return sorted(self._installed.models) if self._installed else []
-
-    def loaded(self) -> Mapping[str, Model]:
-        """The models by category; ModelFault as `installed`."""
-        return self.installed.models
+        """The names that clients choose among, sorted; none until they can be served."""
+        return self._installed.names if self._installed else []
 
     async def models(self) -> Mapping[str, Model]:
-        """As `loaded`, but a request that comes during the start waits for it a while.
+        """The models by the names that clients may use; see `ready`."""
+        return (await self.ready()).named
+
+    async def ready(self) -> Installed:
+        """As `installed`, but a request that comes during the start waits for it a while.
 
         Where the server runs no lifespan, the first such request is the start.
         """
@@ -114,4 +124,17 @@ class Readiness:
             await self.start()
         with anyio.move_on_after(PATIENCE_S):
             await self._done.wait()
-        return self.loaded()
+        return self.installed
+
+
+def _nothing_to_serve(installed: Installed) -> ModelFault:
+    if not installed.faults:
+        return ModelFault(
+            "model_fault",
+            "No model is installed.",
+            "Point MODELS_DIR at a folder that holds <category>.onnx and <category>.json, or name "
+            "categories that come with the service in CATEGORIES.",
+        )
+    reasons = "; ".join(fault.detail for fault in installed.faults)
+    suggestion = installed.faults[0].suggestion
+    return ModelFault("model_fault", f"No model can be served: {reasons}.", suggestion)

@@ -19,7 +19,7 @@ def model() -> Any:
 
 def fault_of(readiness: Readiness) -> ModelFault:
     with pytest.raises(ModelFault) as caught:
-        readiness.loaded()
+        _ = readiness.installed
     return caught.value
 
 
@@ -52,6 +52,10 @@ def raise_unforeseen() -> Any:
     [
         (raise_golden, "stool answers off by 0.2"),
         (lambda: Installed({}), "No model is installed."),
+        (
+            lambda: Installed({}, (ModelFault("model_digest", "a.onnx is altered", "Copy it."),)),
+            "No model can be served: a.onnx is altered.",
+        ),
         (raise_unforeseen, "The models could not be loaded."),
     ],
 )
@@ -122,7 +126,7 @@ def test_a_reload_hands_out_what_is_there_now() -> None:
     readiness = reloaded(
         lambda: Installed({"stool": old}), lambda: Installed({"stool": new, "bench": old}, (bad,))
     )
-    assert readiness.loaded() == {"stool": new, "bench": old}
+    assert readiness.installed.models == {"stool": new, "bench": old}
     assert readiness.names == ["bench", "stool"]
     assert readiness.installed.faults == (bad,)
 
@@ -130,7 +134,8 @@ def test_a_reload_hands_out_what_is_there_now() -> None:
 @pytest.mark.parametrize("look", [raise_golden, raise_unforeseen, lambda: Installed({})])
 def test_a_reload_that_fails_keeps_what_was_there(look: Any) -> None:
     stool = model()
-    assert reloaded(lambda: Installed({"stool": stool}), look).loaded() == {"stool": stool}
+    readiness = reloaded(lambda: Installed({"stool": stool}), look)
+    assert readiness.installed.models == {"stool": stool}
 
 
 def test_a_reload_can_make_good_a_failed_start() -> None:
