@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from model_export.config import SHIPPED
 from model_export.realistic import find_shapes
-from service.affineedit import bind
 from service.affineinference import AffineInference
 from service.constraints import Interval
 from service.deform.demands import Unsatisfiable
@@ -73,11 +72,9 @@ class Result:
 def judge(found: AffineInference) -> Iterator[Result]:
     """Ask for each derived dimension of an upload and measure what comes of it."""
     fit = found.fit
-    binding = bind(found, "blend")
-    by_mesh = found.dimensions(binding.jacobian)
-    by_fit = Dimensions(
-        fit.template, found.parameters, found.vertices, found.scale, binding.jacobian
-    )
+    bound, by_mesh = found.bound("blend"), found.dimensions("blend")
+    shape = fit.template, found.parameters, found.vertices, found.scale
+    by_fit = Dimensions(*shape, bound.columns)
     told = found.dimensions().derived(found.parameters)
     for (name, value), factor, (way, (measures, ask)) in product(
         told.items(), FACTORS, WAYS.items()
@@ -88,7 +85,7 @@ def judge(found: AffineInference) -> Iterator[Result]:
             yield Result(name, way, None)
             continue
         change = outcome.change * found.scale
-        vertices = found.vertices + binding.displace(change)
+        vertices = found.vertices + bound.displace(change)
         had = _measure(found, name, vertices, fit.parameters + change)
         if had is None or outcome.adjusted:
             yield Result(name, way, None)

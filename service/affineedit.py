@@ -7,22 +7,19 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from service import deadline
 from service.affineinference import AffineInference
 from service.conflict import conflict_error
 from service.constraints import NONE, Interval
-from service.deform import blend, paper
 from service.deform.admissible import unusual
-from service.deform.binding import Binding
+from service.deform.bound import Bound
 from service.deform.demands import Unsatisfiable
 from service.deform.dimensions import Dimensions
-from service.deform.followers import following
 from service.deform.outcome import Outcome
 from service.deform.readings import APART
-from service.deform.unfold import unfold
 from service.edited import Measured, Moved, Shift
 from service.edits import Change
 from service.requests import EditOptions
+from service.stages import stage
 
 Array = NDArray[np.float64]
 
@@ -49,24 +46,24 @@ def move(
     Raises:
         InvalidRequest: for an edit that can't be made, or constraints that conflict.
     """
-    fit = found.fit
-    binding = bind(found, options.mode)
-    deadline.check()
-    try:
-        first = found.dimensions(binding.jacobian).outcome(edits, constraints=constraints)
-        if options.mode == "blend":
-            changed = np.flatnonzero(first.change).tolist()
-            binding = unfold(binding, found.vertices, found.mesh.faces, fit.parameters, changed)
-        dimensions = found.dimensions(binding.jacobian)
-        outcome = dimensions.outcome(edits, options.strict, constraints)
-    except Unsatisfiable as conflict:
-        raise conflict_error(conflict, lambda _: found.unit) from conflict
+    bound, dimensions = found.bound(options.mode), found.dimensions(options.mode)
+    with stage("transfer"):
+        try:
+            outcome = dimensions.outcome(edits, options.strict, constraints)
+        except Unsatisfiable as conflict:
+            raise conflict_error(conflict, lambda _: found.unit) from conflict
+        return _moved(found, bound, dimensions, outcome, keep)
+
+
+def _moved(
+    found: AffineInference, bound: Bound, dimensions: Dimensions, outcome: Outcome, keep: str
+) -> Moved:
+    """The mesh after an edit that has come to an outcome."""
+    fit, turn = found.fit, found.best.orientation
     change = outcome.change * found.scale
     _, anchor = fit.template.anchor(keep)
-    turn, scale = found.best.orientation, fit.normalization.scale
-    shift = turn.to_own((binding.displace(change) - anchor @ change) / scale)
-    linear = turn.maps_to_own(binding.linear(change))
-    deadline.check()
+    shift = turn.to_own((bound.displace(change) - anchor @ change) / fit.normalization.scale)
+    linear = turn.maps_to_own(bound.linear(change))
     before = found.dimensions().derived(found.parameters)
     return Moved(
         found,
@@ -80,14 +77,6 @@ def move(
         linear,
         [*_warnings(found, outcome), *_measures(found, dimensions, outcome)],
     )
-
-
-def bind(found: AffineInference, mode: str) -> Binding:
-    """The upload, bound to its fitted template by the rule of a mode."""
-    rule = blend.bind if mode == "blend" else paper.bind
-    fit = found.fit
-    template = following(fit.template, fit.parameters)
-    return rule(found.vertices, found.mesh.faces, template, fit.parameters, fit.translation)
 
 
 def _parameters(found: AffineInference, after: Array) -> list[Shift]:

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from service.deform import blend, paper
+from service.deform.bound import Bound
 from service.deform.dimensions import Dimensions
+from service.deform.followers import following
 from service.deform.measured import Level, find_levels
+from service.deform.unfold import unfold
 from service.encode.affinemodel import AffineModel
 from service.encode.estimate import Estimate
 from service.inference import Inference
 from service.requests import UNITS
 from service.sizes import size_warning
+from service.stages import stage
 
 Array = NDArray[np.float64]
 
@@ -51,17 +56,39 @@ class AffineInference(Inference):
             self.vertices, self.mesh.faces, fit.template, fit.parameters, fit.translation
         )
 
-    def dimensions(self, jacobian: NDArray[np.floating] | None = None) -> Dimensions:
-        """The mesh's dimensions in the reported unit; with a Jacobian, as the mesh itself has them
-        and as they can be changed."""
-        return Dimensions(
-            self.fit.template,
-            self.parameters,
-            self.vertices,
-            self.scale,
-            jacobian,
-            None if jacobian is None else self.levels,
-        )
+    def bound(self, mode: str) -> Bound:
+        """The mesh, bound to its fitted template by the rule of a mode, for edits of all that users
+        see."""
+        return self.memo.get(("bound", mode), partial(self._bound, mode))
+
+    def _bound(self, mode: str) -> Bound:
+        fit, faces, rule = self.fit, self.mesh.faces, blend.bind if mode == "blend" else paper.bind
+        with stage("bind"):
+            template = following(fit.template, fit.parameters)
+            binding = rule(self.vertices, faces, template, fit.parameters, fit.translation)
+            if mode == "blend":
+                binding = unfold(binding, self.vertices, faces, fit.parameters, self._changing)
+            return binding.bound(self._changing)
+
+    @property
+    def _changing(self) -> list[int]:
+        """Indices of the parameters that an edit may change."""
+        template = self.fit.template
+        by = [index for dimension in template.derived.values() for index in dimension.by]
+        return sorted({*np.flatnonzero(template.public).tolist(), *by})
+
+    def dimensions(self, mode: str | None = None) -> Dimensions:
+        """The mesh's dimensions in the reported unit: as the fit has them; or, once the mesh is
+        bound by the rule of a mode, as it has them itself and as they can be changed."""
+        return self.memo.get(("dimensions", mode), partial(self._dimensions, mode))
+
+    def _dimensions(self, mode: str | None) -> Dimensions:
+        template, parameters, scale = self.fit.template, self.parameters, self.scale
+        if mode is None:
+            return Dimensions(template, parameters, self.vertices, scale)
+        columns = self.bound(mode).columns
+        with stage("bind"):
+            return Dimensions(template, parameters, self.vertices, scale, columns, self.levels)
 
     def parameter_report(self) -> dict[str, dict[str, Any]]:
         template = self.model.template

@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service import deadline
-from service.affineedit import bind
 from service.affineinference import AffineInference
 from service.deform.admissible import LEAST, Bounds
-from service.deform.binding import Binding
+from service.deform.bound import Bound, columns_of
 from service.deform.followers import following
-from service.deform.unfold import unfold
+from service.deform.gradient import Gradient
 from service.mesh.convert import convert
 from service.mesh.embedding import as_glb
 from service.mesh.glb import GlbFile
@@ -23,6 +21,7 @@ from service.mesh.stretch import Stretch
 from service.mesh.targets import Target, add_targets
 from service.requests import UNITS, SliderOptions, file_unit
 from service.sliders import Slider, chosen, notes, size_range, targets_of
+from service.stages import stage
 
 Array = NDArray[np.float64]
 Plane = tuple[float, Array]
@@ -43,49 +42,47 @@ def sliders(found: AffineInference, options: SliderOptions, keep: str) -> bytes:
     Raises:
         InvalidRequest: for an unknown parameter.
     """
-    names, indices = _chosen(found, options)
-    binding = bind(found, "blend")
-    deadline.check()
-    binding = unfold(binding, found.vertices, found.mesh.faces, found.fit.parameters, indices)
-    deadline.check()
-    shown = as_glb(found.mesh, file_unit(found.mesh.format, found.unit))
-    return _with_targets(found, shown, binding, names, options, keep, _measured(found, binding))
+    names = _chosen(found, options)
+    bound, measured = found.bound("blend"), _measured(found)
+    with stage("write"):
+        shown = as_glb(found.mesh, file_unit(found.mesh.format, found.unit))
+        return _with_targets(found, shown, bound, names, options, keep, measured)
 
 
 def template(found: AffineInference, options: SliderOptions, keep: str) -> bytes:
     """The fitted template as a GLB in the upload's frame, with the same morph targets."""
-    names, _ = _chosen(found, options)
-    fit = found.fit
+    names, fit = _chosen(found, options), found.fit
     followed = following(fit.template, fit.parameters)
     own = fit.normalization.invert(fit.template.decode(fit.parameters) + fit.translation)
     vertices = found.best.orientation.to_own(own) * file_unit(found.mesh.format, found.unit)
     file = GlbFile(convert(vertices, fit.template.faces, "glb"))
-    still = np.zeros((1, 9, len(followed.names)), np.float32)
-    none = np.zeros((len(vertices), 1), np.float32)
-    binding = Binding(followed.jacobian.astype(np.float32), none, still)
+    every = range(len(followed.names))
+    columns = columns_of(followed.jacobian.astype(np.float32), every)
+    still = Gradient([], np.zeros((0, len(vertices)), np.float32))
+    bound = Bound(len(vertices), columns, dict.fromkeys(every, still))
     shown = (file, np.arange(len(vertices)))
-    return _with_targets(found, shown, binding, names, options, keep, {})
+    with stage("write"):
+        return _with_targets(found, shown, bound, names, options, keep, {})
 
 
-def _chosen(found: AffineInference, options: SliderOptions) -> tuple[list[str], list[int]]:
-    """Names and indices of the parameters to offer."""
+def _chosen(found: AffineInference, options: SliderOptions) -> list[str]:
+    """Names of the parameters to offer."""
     template = found.model.template
     public = [n for n, seen in zip(template.names, template.public, strict=True) if seen]
-    names = chosen(public, options.parameters, found.model.name)
-    return names, [template.names.index(name) for name in names]
+    return chosen(public, options.parameters, found.model.name)
 
 
 def _with_targets(
     found: AffineInference,
     shown: tuple[GlbFile, Indices],
-    binding: Binding,
+    bound: Bound,
     names: Sequence[str],
     options: SliderOptions,
     keep: str,
     measured: Mapping[str, Plane],
 ) -> bytes:
     offered = _sliders(found, names)
-    targets = _targets(found, shown, binding, offered, options.paired, keep)
+    targets = _targets(found, shown, bound, offered, options.paired, keep)
     asset = notes(found, keep, offered, _further(found, names, measured))
     return add_targets(shown[0], targets, asset, options.quantize)
 
@@ -117,7 +114,7 @@ def _bounds(found: AffineInference) -> Bounds:
 def _targets(
     found: AffineInference,
     shown: tuple[GlbFile, Indices],
-    binding: Binding,
+    bound: Bound,
     offered: Sequence[Slider],
     paired: bool,
     keep: str,
@@ -133,14 +130,14 @@ def _targets(
     # What a normalised length is in the GLB, in metres.
     metre = file_unit(found.mesh.format, found.unit) / found.fit.normalization.scale
     size = float(np.linalg.norm(np.ptp(file.vertices, axis=0)))
-    every, rotation = np.arange(len(binding.jacobian)), turn.rotation.astype(np.float32)
+    rotation = turn.rotation.astype(np.float32)
     for slider in offered:
         index = template.names.index(slider.name)
-        column = binding.jacobian[:, :, index].astype(np.float64) - anchor[:, index]
+        column = bound.column(index).astype(np.float64) - anchor[:, index]
         shift = turn.to_own(column) * (found.scale * metre)
         largest = np.abs(slider.change) * _largest(shift)
         shift[largest < SLIGHT * size / len(offered)] = 0.0
-        gradient = binding.gradient(index, every)
+        gradient = bound.gradients[index]
         cells = dict(zip(gradient.cells, gradient.values * np.float32(found.scale), strict=True))
         stretch = Stretch(cells).between(rotation.T, rotation)
         yield from targets_of(slider, shift[of], stretch.at(of), paired)
@@ -152,10 +149,10 @@ def _largest(shift: Array) -> Array:
     return np.maximum(np.maximum(x, y), z)
 
 
-def _measured(found: AffineInference, binding: Binding) -> dict[str, Plane]:
+def _measured(found: AffineInference) -> dict[str, Plane]:
     """Derived dimensions that edits take from the mesh itself, affine in the parameters."""
     f, rows = found.parameters, {}
-    for name, reading in found.dimensions(binding.jacobian).readings.items():
+    for name, reading in found.dimensions("blend").readings.items():
         if reading.corrects:
             value, row = reading.gauge.tangent(np.zeros_like(f))
             rows[name] = (value - float(row @ f), row)

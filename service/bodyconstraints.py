@@ -61,7 +61,7 @@ def _stature(found: BodyInference) -> Gauge:
     heights = template.shaped(body.shape)[0][:, 1]
     rows = np.zeros((len(heights), len(NAMES)))
     rows[:, -SHAPES:] = template.shapedirs[:, 1]
-    ends = Heights(heights * reported, rows * reported)
+    ends = Heights.of(heights * reported, rows * reported)
     return Gauge(ends, ends)
 
 

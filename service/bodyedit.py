@@ -9,17 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from service import deadline
 from service.bodyconstraints import STATURE, TALLER, constrain
 from service.bodyinference import PARAMETER_UNITS, BodyInference
 from service.constraints import NONE, Interval
-from service.deform import bodypaper, skinbinding
 from service.edited import Measured, Moved, Shift
 from service.edits import Change
 from service.encode.bodymodel import SPREAD, stature
 from service.errors import InvalidRequest
 from service.namedentries import require_known
 from service.requests import EditOptions
+from service.stages import stage
 from service.template.anatomy import JOINTS, limits
 from service.template.skinned import NAMES, SHAPES, Body, SkinnedTemplate
 
@@ -52,26 +51,25 @@ def move(
     """
     template, before = found.model.template, found.fit.body
     require_known(found.model.name, (*edits, *constraints), (*NAMES, STATURE))
-    values = _values(found, edits)
-    if constraints:
-        values = constrain(found, values, edits, constraints)
-    after = standing(template, before, edited(before, values), keep)
-    deadline.check()
-    vertices, linear = _carried(found, after, options.mode)
-    deadline.check()
-    turn, scale = found.best.orientation, found.fit.normalization.scale
-    shift = turn.to_own((vertices - found.vertices) / scale)
-    rows = zip(NAMES, found.parameters.tolist(), values.tolist(), PARAMETER_UNITS, strict=True)
-    statures = found.stature(before), found.stature(after)
-    return Moved(
-        found,
-        [Shift(*row) for row in rows],
-        [Shift(STATURE, *statures, found.unit)],
-        [Measured(STATURE, *statures, found.unit, _asked(found, edits, constraints))],
-        found.mesh.vertices + shift,
-        turn.maps_to_own(linear),
-        _warnings(found.parameters, values),
-    )
+    binding = found.skin if options.mode == "blend" else found.paper
+    with stage("transfer"):
+        values = _values(found, edits)
+        if constraints:
+            values = constrain(found, values, edits, constraints)
+        after = standing(template, before, edited(before, values), keep)
+        turn, scale = found.best.orientation, found.fit.normalization.scale
+        shift = turn.to_own((binding.move(before, after) - found.vertices) / scale)
+        rows = zip(NAMES, found.parameters.tolist(), values.tolist(), PARAMETER_UNITS, strict=True)
+        statures = found.stature(before), found.stature(after)
+        return Moved(
+            found,
+            [Shift(*row) for row in rows],
+            [Shift(STATURE, *statures, found.unit)],
+            [Measured(STATURE, *statures, found.unit, _asked(found, edits, constraints))],
+            found.mesh.vertices + shift,
+            turn.maps_to_own(binding.linear(before, after)),
+            _warnings(found.parameters, values),
+        )
 
 
 def _values(found: BodyInference, edits: Mapping[str, Change]) -> Array:
@@ -164,17 +162,6 @@ def standing(template: SkinnedTemplate, before: Body, after: Body, keep: str) ->
         lowest = (template.decode(body)[:, 1].min() for body in (before, posed))
         hips[1] += next(lowest) - next(lowest)
     return replace(after, translation=before.translation + hips)
-
-
-def _carried(found: BodyInference, after: Body, mode: str) -> tuple[Array, Array]:
-    """``[V, 3]`` vertices after the edit, normalised, and ``[V, 3, 3]`` how each place turned."""
-    template, before = found.model.template, found.fit.body
-    binding = (
-        skinbinding.bind(found.vertices, found.mesh.faces, template, before)
-        if mode == "blend"
-        else bodypaper.bind(found.vertices, template, before)
-    )
-    return binding.move(before, after), binding.linear(before, after)
 
 
 def _warnings(before: Array, after: Array) -> list[str]:

@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.deform import bodypaper, skinbinding
+from service.deform.bodypaper import PaperBinding
+from service.deform.skinbinding import SkinBinding
 from service.encode.bodyestimate import BodyEstimate
 from service.encode.bodymodel import BodyModel, stature
 from service.inference import Inference
 from service.requests import UNITS
 from service.sizes import stature_warning
+from service.stages import stage
 from service.template.anatomy import JOINTS
 from service.template.skinned import NAMES, SHAPES, Body
 
@@ -48,6 +52,25 @@ class BodyInference(Inference):
     def parameters(self) -> Array:
         """``[75]`` in the order of `NAMES`."""
         return self.fit.body.parameters
+
+    @property
+    def skin(self) -> SkinBinding:
+        """The mesh, bound to the joints of the fitted body."""
+        return self.memo.get("skin", self._skin)
+
+    def _skin(self) -> SkinBinding:
+        with stage("bind"):
+            body = self.fit.body
+            return skinbinding.bind(self.vertices, self.mesh.faces, self.model.template, body)
+
+    @property
+    def paper(self) -> PaperBinding:
+        """The mesh, bound to the vertices of the fitted body."""
+        return self.memo.get("paper", self._paper)
+
+    def _paper(self) -> PaperBinding:
+        with stage("bind"):
+            return bodypaper.bind(self.vertices, self.model.template, self.fit.body)
 
     def stature(self, body: Body) -> float:
         """Height of a body, standing straight, in the reported unit."""

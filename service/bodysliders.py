@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service import deadline
 from service.bodyconstraints import STATURE
 from service.bodyedit import ANGLES, standing
 from service.bodyinference import BodyInference
-from service.deform import skinbinding
 from service.deform.skinbinding import SkinBinding, sparse_rows
 from service.errors import InvalidRequest
 from service.mesh.convert import convert
@@ -27,6 +25,7 @@ from service.mesh.unskin import unskinned
 from service.requests import RESTS, UNITS, SliderOptions, file_unit
 from service.skeleton import Skeleton, joint_nodes
 from service.sliders import Slider, chosen, notes, targets_of
+from service.stages import stage
 from service.template.anatomy import JOINTS, PARENTS
 from service.template.jointnames import JOINT_NAMES
 from service.template.skinned import NAMES, SHAPES, Body
@@ -45,12 +44,10 @@ def sliders(found: BodyInference, options: SliderOptions, keep: str) -> bytes:
     Raises:
         InvalidRequest: for an unknown parameter, set of joint names or rest pose.
     """
-    binding = skinbinding.bind(
-        found.vertices, found.mesh.faces, found.model.template, found.fit.body
-    )
-    deadline.check()
-    file, of = as_glb(found.mesh, file_unit(found.mesh.format, found.unit))
-    return _Rigged(found, binding, options, keep, of).write(unskinned(file))
+    binding = found.skin
+    with stage("write"):
+        file, of = as_glb(found.mesh, file_unit(found.mesh.format, found.unit))
+        return _Rigged(found, binding, options, keep, of).write(unskinned(file))
 
 
 def template(found: BodyInference, options: SliderOptions, keep: str) -> bytes:
@@ -61,8 +58,9 @@ def template(found: BodyInference, options: SliderOptions, keep: str) -> bytes:
     binding = SkinBinding(body, posed, sparse_rows(body.weights), shapedirs)
     own = found.best.orientation.to_own(found.fit.normalization.invert(posed))
     own *= file_unit(found.mesh.format, found.unit)
-    file = GlbFile(convert(own, body.faces, "glb"))
-    return _Rigged(found, binding, options, keep, np.arange(len(own))).write(file)
+    with stage("write"):
+        file = GlbFile(convert(own, body.faces, "glb"))
+        return _Rigged(found, binding, options, keep, np.arange(len(own))).write(file)
 
 
 class _Rigged:
@@ -104,7 +102,6 @@ class _Rigged:
             turn = self.found.best.orientation
             linear = turn.maps_to_own(self.binding.linear(before, self.rest))
             file = GlbFile(file.write(self._own(vertices)[self.of], linear[self.of]))
-        deadline.check()
         offered = [self._slider(name) for name in self.names]
         asset = notes(self.found, self.keep, offered, self._further())
         shapes = [slider for slider in offered if slider.kind == "coefficient"]

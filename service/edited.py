@@ -15,6 +15,7 @@ from service.inference import Inference
 from service.mesh.convert import convert
 from service.mesh.formats import MEDIA_TYPES
 from service.requests import file_unit
+from service.stages import stage
 
 Array = NDArray[np.float64]
 
@@ -96,14 +97,17 @@ def write_edited(moved: Moved, format: str | None) -> Edited:
         format: to write; None keeps the file's own, and with it everything but positions.
     """
     found, mesh = moved.found, moved.found.mesh
-    if format is None or format == mesh.suffix:
-        data, media_type = mesh.write(moved.vertices, moved.linear), mesh.media_type
-    else:
-        factor = file_unit(format, found.unit) / file_unit(mesh.format, found.unit)
-        data = convert(moved.vertices / factor, mesh.faces, format)
-        media_type = next(kind for kind, name in MEDIA_TYPES.items() if name == format)
+    with stage("write"):
+        if format is None or format == mesh.suffix:
+            data, media_type = mesh.write(moved.vertices, moved.linear), mesh.media_type
+        else:
+            factor = file_unit(format, found.unit) / file_unit(mesh.format, found.unit)
+            data = convert(moved.vertices / factor, mesh.faces, format)
+            media_type = next(kind for kind, name in MEDIA_TYPES.items() if name == format)
+    with stage("transfer"):
+        report = _report(moved)
     values = {shift.name: shift.after for shift in (*moved.parameters, *moved.derived)}
-    return Edited(data, format or mesh.suffix, media_type, values, _report(moved))
+    return Edited(data, format or mesh.suffix, media_type, values, report)
 
 
 def _report(moved: Moved) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from service.encode.basemodel import Model
 from service.encode.recognition import Candidate
 from service.mesh.meshfile import MeshFile
+from service.once import Memo
 from service.requests import Upload
 
 Array = NDArray[np.float64]
@@ -27,13 +28,15 @@ IN_DISTRIBUTION = 0.5
 class Inference(ABC):
     """An upload's parameters, and the way between its frame and the normalised one.
 
-    What they are depends on the kind of the category: a subclass each knows.
+    What they are depends on the kind of the category: a subclass each knows.  It may be kept for
+    later requests, and shared by several: what they first ask for is found once and stays.
 
     Attributes:
         upload, mesh: the file, as bytes and read.
         candidates: readings of it, best first.
         unit: that lengths are reported in.
         unit_scale: reported units per unit of the file.
+        memo: what was found later.
     """
 
     upload: Upload
@@ -41,6 +44,12 @@ class Inference(ABC):
     candidates: list[Candidate]
     unit: str
     unit_scale: float
+    memo: Memo = field(init=False, repr=False, compare=False, default_factory=Memo)
+
+    @property
+    def parts(self) -> int:
+        """How much there is of it: it grows as more is asked for."""
+        return len(vars(self)) + len(self.memo) + self.mesh.parts
 
     @property
     def best(self) -> Candidate:
@@ -128,7 +137,7 @@ class Inference(ABC):
                 ],
             },
             "model": self.model.identity,
-            "warnings": self.warnings,
+            "warnings": list(self.warnings),
         }
 
     @cached_property

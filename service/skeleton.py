@@ -49,9 +49,7 @@ class Skeleton:
     @classmethod
     def of(cls, found: BodyInference) -> Skeleton:
         """The skeleton of an inferred body, in the pose that it was inferred to have."""
-        template, body = found.model.template, found.fit.body
-        binding = skinbinding.bind(found.vertices, found.mesh.faces, template, body)
-        return cls.of_binding(found, binding, body)
+        return cls.of_binding(found, found.skin, found.fit.body)
 
     @classmethod
     def of_binding(cls, found: BodyInference, binding: SkinBinding, body: Body) -> Skeleton:

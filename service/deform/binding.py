@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from service.deform.bound import Bound, columns_of
 from service.deform.gradient import Gradient
 from service.deform.weld import Welded
 from service.template.affine import AffineTemplate
@@ -38,23 +40,18 @@ class Binding:
     welded: Welded | None = None
 
     def displace(self, df: ArrayLike) -> Array32:
-        """Displacements ``[V, 3]`` for a change of the parameters ``df [d]``.
-
-        Coordinates that no changed parameter moves are exactly zero.
-        """
-        df = np.asarray(df, np.float32)
-        moved = np.zeros((3, len(self.jacobian)), np.float32)
-        for index in np.flatnonzero(df):
-            for axis in range(3):
-                moved[axis] += df[index] * self.jacobian[:, axis, index]
-        return moved.T
+        """See `Bound.displace`."""
+        return self.bound(np.flatnonzero(df).tolist()).displace(df)
 
     def linear(self, df: ArrayLike) -> Array32:
-        """Local linear maps ``[V, 3, 3]`` for ``df [d]``: tangents follow them, normals their
-        inverse transpose."""
-        added = self.gains @ (self.stretches @ np.asarray(df, np.float32))
-        maps: Array32 = added.reshape(-1, 3, 3) + np.eye(3, dtype=np.float32)
-        return maps
+        """See `Bound.linear`."""
+        return self.bound(np.flatnonzero(df).tolist()).linear(df)
+
+    def bound(self, parameters: Sequence[int]) -> Bound:
+        """What is to be kept of it for changes of the parameters with these indices."""
+        gradients = {index: self.gradient(index, slice(None)) for index in parameters}
+        columns = columns_of(self.jacobian, parameters)
+        return Bound(len(self.jacobian), columns, gradients)
 
     def gradient(self, index: int, rows: NDArray[np.int64] | slice) -> Gradient:
         """What a unit of one parameter adds to the linear maps of some vertices."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from service.constraints import NONE, Interval
 from service.deform.admissible import LEAST, Bounds
+from service.deform.bound import Columns
 from service.deform.demands import Limits
 from service.deform.measured import Level
 from service.deform.outcome import Outcome, accorded
@@ -37,7 +38,7 @@ class Dimensions:
         parameters: Array,
         vertices: Array,
         scale: float = 1.0,
-        jacobian: NDArray[np.floating] | None = None,
+        columns: Columns | None = None,
         levels: Mapping[str, Level] | None = None,
     ) -> None:
         """
@@ -46,15 +47,13 @@ class Dimensions:
             parameters: ``[d]`` before the edit.
             vertices: ``[V, 3]`` of the mesh, in canonical orientation and any unit.
             scale: lengths in the vertices' unit per length in the parameters' unit.
-            jacobian: ``[V, 3, d]`` displacement of each vertex per unit of each parameter; without
-                it the dimensions can be read, not changed.
+            columns: displacement of each vertex per unit of each parameter; without them the
+                dimensions can be read, not changed.
             levels: where the mesh itself is measured, by dimension (see `find_levels`).
         """
         self.template = template
         self.parameters = parameters
-        self.vertices = vertices
-        self.jacobian = jacobian
-        self.readings = read(template, parameters, vertices, scale, jacobian, levels or {})
+        self.readings = read(template, parameters, vertices, scale, columns or {}, levels or {})
         self._bounds = Bounds.of(template, parameters, LEAST / scale)
         self._still = np.zeros_like(parameters)
 

@@ -7,6 +7,7 @@ is here, which makes an upper bound on it a set of linear inequalities.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,25 +22,32 @@ class Heights:
 
     Attributes:
         values: ``[n]`` without a change.
-        rows: ``[n, d]``, or None where no change moves any.
+        columns: ``[n]`` of ``rows [n, d]``, by parameter; those that are left out are zero.
     """
 
     values: Array
-    rows: NDArray[np.floating] | None
+    columns: Mapping[int, NDArray[np.floating]]
+
+    @classmethod
+    def of(cls, values: Array, rows: NDArray[np.floating]) -> Heights:
+        """From all ``rows [n, d]``."""
+        moving = np.flatnonzero(rows.any(axis=0)).tolist()
+        return cls(values, {index: rows[:, index] for index in moving})
 
     def at(self, change: Array) -> Array:
         """``[n]`` after a change."""
-        moving = np.flatnonzero(change)
-        if self.rows is None or not len(moving):
-            return self.values
-        moved: Array = self.values + self.rows[:, moving] @ change[moving]
+        moved = self.values
+        for index, column in self.columns.items():
+            if change[index]:
+                moved = moved + change[index] * column
         return moved
 
     def row(self, index: int, size: int) -> Array:
         """``[d]`` how one of them depends on the change."""
-        if self.rows is None:
-            return np.zeros(size)
-        return self.rows[index].astype(np.float64)
+        row = np.zeros(size)
+        for parameter, column in self.columns.items():
+            row[parameter] = column[index]
+        return row
 
 
 @dataclass(frozen=True)
@@ -52,7 +60,7 @@ class Gauge:
     @classmethod
     def affine(cls, value: float, row: Array) -> Gauge:
         """One that is linear: ``value + row [d] @ change``."""
-        return cls(Heights(np.array([value]), row[None]))
+        return cls(Heights.of(np.array([value]), row[None]))
 
     def value(self, change: Array) -> float:
         """What it measures after a change ``[d]``."""

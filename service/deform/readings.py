@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from service.deform.bound import Columns
 from service.deform.gauges import Gauge, Heights
 from service.deform.measured import Level
 from service.edits import Change
@@ -95,14 +96,14 @@ def read(
     parameters: Array,
     vertices: Array,
     scale: float,
-    jacobian: NDArray[np.floating] | None,
+    columns: Columns,
     levels: Mapping[str, Level],
 ) -> dict[str, Reading]:
     """The derived dimensions of a mesh by name; the arguments are those of `Dimensions`."""
 
     def along(axis: int) -> Heights:
-        rows = None if jacobian is None else jacobian[:, axis]
-        return Heights(vertices[:, axis] / scale, rows)
+        own = {index: column for (along, index), column in columns.items() if along == axis}
+        return Heights(vertices[:, axis] / scale, own)
 
     found = {}
     for name, dimension in template.derived.items():
@@ -116,9 +117,9 @@ def read(
         gauge = Gauge.affine(fitted, dimension.row[1:])
         mesh = None
         if name in levels:
-            height = levels[name].of(vertices[:, 1])[None] / scale
-            row = None if jacobian is None else levels[name].of(jacobian[:, 1])[None]
-            mesh = Gauge(Heights(height, row), along(1))
+            floor, level = along(1), levels[name]
+            rises = {index: level.of(column)[None] for index, column in floor.columns.items()}
+            mesh = Gauge(Heights(level.of(floor.values)[None], rises), floor)
             behind = np.flatnonzero((dimension.row[1:] != 0.0) & template.public).tolist()
             way = _followed(gauge, mesh, (dimension.by, behind), parameters)
             if way is not None:

@@ -32,6 +32,11 @@ class Archive:
         entries = self._directory.entries
         return {entry.name: entry for entry in entries if not entry.name.endswith("/")}
 
+    @property
+    def parts(self) -> int:
+        """How many members have been read so far."""
+        return len(self._contents)
+
     def read(self, name: str) -> bytes:
         """The content of member `name`, inflated no further than its size in the directory.
 

@@ -42,6 +42,11 @@ class MeshFile(ABC):
         """``[G, 3]`` those of `faces` that are there to be seen, not for collisions."""
         return self.faces
 
+    @property
+    def parts(self) -> int:
+        """How many parts of it have been read, where some are read when they are first needed."""
+        return 1
+
     @abstractmethod
     def write(self, vertices: Vertices, linear: Linear) -> bytes:
         """The same file with its vertices moved.

@@ -56,6 +56,11 @@ class ZippedFile(MeshFile):
         """See `MeshFile.visible`."""
         return self.inner.visible
 
+    @property
+    def parts(self) -> int:
+        """See `MeshFile.parts`: members of the archive."""
+        return self._archive.parts
+
     def write(self, vertices: Vertices, linear: Linear) -> bytes:
         """See `MeshFile.write`; only members that hold what moved differ."""
         written = self.inner.write_files(vertices, linear)

@@ -15,7 +15,7 @@ LEG, THICK = NAMES.index("leg_height"), NAMES.index("seat_thickness")
 @pytest.fixture
 def reading() -> Reading:
     vertices = chair().decode(PARAMETERS)
-    return read(chair(), PARAMETERS, vertices, 1.0, None, {})["seat_top_height"]
+    return read(chair(), PARAMETERS, vertices, 1.0, {}, {})["seat_top_height"]
 
 
 def free(*but: int) -> np.ndarray:

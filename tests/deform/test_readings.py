@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from boxes import ORIGIN, PARAMETERS, chair
 
+from service.deform.bound import columns_of
 from service.deform.measured import Level
 from service.deform.readings import Reading, read
 from service.edits import Change
@@ -24,7 +25,9 @@ def reading(raised: float = 0.0, rises: float = 1.0) -> Reading:
     vertices[top, 1] += raised
     rows = np.flatnonzero(top)
     levels = {"seat_top_height": Level(rows, np.full(len(rows), 1 / len(rows)))}
-    return read(template, PARAMETERS, vertices, 1.0, jacobian, levels)["seat_top_height"]
+    return read(template, PARAMETERS, vertices, 1.0, columns_of(jacobian, range(8)), levels)[
+        "seat_top_height"
+    ]
 
 
 def test_the_mesh_stands_in_for_the_fit() -> None:
@@ -45,7 +48,7 @@ def test_unless_it_measures_something_else_or_does_not_follow(raised: float, ris
 
 def test_without_a_level_the_fit_is_all_there_is() -> None:
     vertices = chair().decode(PARAMETERS)
-    found = read(chair(), PARAMETERS, vertices, 1.0, chair().jacobian, {})
+    found = read(chair(), PARAMETERS, vertices, 1.0, columns_of(chair().jacobian, range(8)), {})
     assert found["seat_top_height"].mesh is None
     assert not found["seat_top_height"].corrects
     width = found["total_width"]
@@ -61,7 +64,9 @@ def test_where_legs_move_nothing_all_behind_it_does() -> None:
     jacobian = np.zeros_like(template.jacobian)
     jacobian[top, 1, thick] = PARAMETERS[[LEG, thick]].sum() / PARAMETERS[thick]
     levels = {"seat_top_height": Level(top, np.full(len(top), 1 / len(top)))}
-    found = read(template, PARAMETERS, vertices, 1.0, jacobian, levels)["seat_top_height"]
+    found = read(template, PARAMETERS, vertices, 1.0, columns_of(jacobian, range(8)), levels)[
+        "seat_top_height"
+    ]
     assert found.corrects
     assert set(found.by) == {LEG, thick}
 
