@@ -27,8 +27,8 @@ def asked_categories(value: str | Sequence[str]) -> tuple[str, ...]:
     """The categories that a setting names.
 
     Args:
-        value: names, or their text with commas between; nothing is the usual ones, and ``none`` is
-            none.
+        value: names, or their text with commas between; an empty text is the usual ones, and
+            ``none`` is none.
 
     Raises:
         ValueError: for a name that none of them has.
@@ -44,4 +44,4 @@ def asked_categories(value: str | Sequence[str]) -> tuple[str, ...]:
                 f"{name!r} does not come with the service; name some of {', '.join(known)}, "
                 f"or {NONE}"
             )
-    return names or usual_categories()
+    return names if names or not isinstance(value, str) else usual_categories()

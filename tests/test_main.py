@@ -25,15 +25,16 @@ def test_making_an_app_loads_no_model(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_workers_share_the_cpus(monkeypatch: pytest.MonkeyPatch, serve: Any) -> None:
     asked: list[Any] = []
 
-    def load(directory: Any, threads: int, body: Any) -> Any:
-        asked.append((directory, threads, body))
+    def load(directory: Any, threads: int, body: Any, names: Any) -> Any:
+        asked.append((directory, threads, body, names))
         return {}
 
     monkeypatch.setattr(main, "cpu_count", lambda: 8)
     monkeypatch.setattr(main, "load_models", load)
-    app = main.create_app(Settings(workers=3, body_model=Path("mine.npz")))
+    settings = Settings(workers=3, body_model=Path("mine.npz"), categories=("chair",))
+    app = main.create_app(settings)
     serve(app).get("/categories")
-    assert asked == [(SHIPPED, 2, Path("mine.npz"))]
+    assert asked == [(SHIPPED, 2, Path("mine.npz"), ("chair",))]
     assert app.state.context.workers.count == 3
     assert main.create_app(Settings(workers=None)).state.context.workers.count == 8
 

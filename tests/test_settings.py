@@ -12,6 +12,8 @@ GIVEN = {
     "PORT": "80",
     "MODELS_DIR": "/m",
     "BODY_MODEL": "/b.npz",
+    "CATEGORIES": "human, chair",
+    "DEFAULT_MODELS": "chair=1.0.0, human=2",
     "MAX_UPLOAD_BYTES": "5",
     "MESH_CACHE_BYTES": "0",
     "STORE_DIR": "/s",
@@ -44,6 +46,8 @@ def test_the_defaults_serve_this_machine_only() -> None:
     assert settings.store_url is None
     assert settings.models_dir is None
     assert settings.body_model is None
+    assert settings.categories == ("airplane", "chair", "human")
+    assert settings.default_models == {}
     assert settings.api_keys.get_secret_value() == ""
     assert settings.api_keys_file is None
     assert settings.cors_origins == ()
@@ -59,6 +63,8 @@ def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
         port=80,
         models_dir=Path("/m"),
         body_model=Path("/b.npz"),
+        categories=("human", "chair"),
+        default_models={"chair": "1.0.0", "human": "2"},
         max_upload_bytes=5,
         mesh_cache_bytes=0,
         store_dir=Path("/s"),
@@ -79,6 +85,8 @@ def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
     ("name", "value"),
     [
         ("PORT", "65536"),
+        ("CATEGORIES", "chair,sofa"),
+        ("DEFAULT_MODELS", "chair"),
         ("MAX_UPLOAD_BYTES", "0"),
         ("CORS_ORIGINS", "shapes.example"),
         ("MESH_CACHE_BYTES", "-1"),

@@ -24,6 +24,7 @@ def test_all_but_the_debug_category_are_usual() -> None:
         ("", USUAL),
         (" , ", USUAL),
         ("none", ()),
+        ((), ()),
     ],
 )
 def test_names_with_commas_between(value: Any, expected: tuple[str, ...]) -> None:
