@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 from prometheus_client.core import Metric
 
 from service.main import create_app
@@ -15,6 +16,11 @@ from service.settings import Settings
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "observability.md"
 DASHBOARD = ROOT / "docker" / "grafana" / "dashboard.json"
+ALERTS = ROOT / "docker" / "prometheus" / "alerts.yaml"
+ASKING = [
+    PAGE,
+    *(f for f in sorted((ROOT / "docker").rglob("*.*")) if f.suffix in (".json", ".yaml")),
+]
 ROW = re.compile(r"\| `(shape_parameters_\w+)` \| (\w+) \| ?(.*?) ?\| .+ \|")
 SUFFIXES = {"counter": ("_total",), "gauge": ("",), "histogram": ("_bucket", "_count", "_sum")}
 
@@ -43,14 +49,23 @@ def test_the_page_lists_their_labels(families: dict[str, Metric]) -> None:
             assert set(sample.labels) - {"le"} == listed, name
 
 
-@pytest.mark.parametrize("path", [PAGE, DASHBOARD], ids=lambda path: path.name)
+@pytest.mark.parametrize("path", ASKING, ids=lambda path: path.name)
 def test_what_is_asked_for_is_there(families: dict[str, Metric], path: Path) -> None:
     series = {
         family.name + suffix for family in families.values() for suffix in SUFFIXES[family.type]
     }
     told = set(re.findall(r"shape_parameters_\w+", path.read_text("utf-8")))
-    assert told
+    assert told or path not in (PAGE, DASHBOARD, ALERTS)
     assert told <= series | set(families)
+
+
+def test_each_alert_is_told_and_says_what_it_means() -> None:
+    (group,) = yaml.safe_load(ALERTS.read_text("utf-8"))["groups"]
+    page = PAGE.read_text("utf-8")
+    for rule in group["rules"]:
+        assert f"| `{rule['alert']}` |" in page
+        assert rule["labels"]["severity"] in ("critical", "warning")
+        assert {"summary", "description"} == set(rule["annotations"])
 
 
 def test_the_dashboard_has_panels_that_ask() -> None:
