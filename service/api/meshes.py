@@ -10,9 +10,9 @@ from starlette.responses import Response
 from service.api.context import Shared
 from service.api.etags import strong
 from service.api.keeping import owner_of
-from service.api.mesh_response import mesh_response
+from service.api.mesh_response import OPAQUE, mesh_response
 from service.api.problems import documented
-from service.api.schemas import MESH_CONTENT, MESH_HEADERS
+from service.api.schemas import BINARY, MESH_CONTENT, MESH_HEADERS
 
 router = APIRouter(tags=["meshes"])
 
@@ -27,7 +27,11 @@ CACHING = {"Cache-Control": "private, max-age=31536000, immutable"}
     "bounded: a mesh that is gone is a 404 with the code `mesh_id_unknown`.",
     response_class=Response,
     responses={
-        200: {"description": "The file.", "content": MESH_CONTENT, "headers": MESH_HEADERS},
+        200: {
+            "description": "The file; of no type in particular where it came without a suffix.",
+            "content": {**MESH_CONTENT, OPAQUE: BINARY},
+            "headers": MESH_HEADERS,
+        },
         304: {"description": "The client's `If-None-Match` names this mesh."},
         **documented(404, 500),
     },

@@ -23,7 +23,8 @@ with only its vertices moved.
          http://127.0.0.1:8000/edit -OJ
 
 Formats: `.glb`, `.gltf`, `.obj`, `.ply`, `.stl`, `.off`, or a `.zip` with one of them and the files
-that belong to it: a `.gltf` with its `.bin`, an `.obj` with its materials and textures. Every error
+that belong to it: a `.gltf` with its `.bin`, an `.obj` with its materials and textures. Form fields
+are text: `true` may be `1` and `false` `0`, and an empty field is as good as none. Every error
 is an `application/problem+json` with a stable `code`, a `detail` and a `suggestion`. Every answer
 has a `Trace-Id`.
 """
