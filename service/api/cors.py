@@ -11,7 +11,14 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from service.api.problems import Problem
 
 METHODS = ("GET", "HEAD", "POST")
-REQUEST_HEADERS = ("Authorization", "If-None-Match", "X-API-Key", "traceparent", "tracestate")
+REQUEST_HEADERS = (
+    "Authorization",
+    "If-None-Match",
+    "X-API-Key",
+    "X-Request-Id",
+    "traceparent",
+    "tracestate",
+)
 ANSWER_HEADERS = (
     "Content-Disposition",
     "ETag",
@@ -20,6 +27,7 @@ ANSWER_HEADERS = (
     "Shape-Parameters",
     "Trace-Id",
     "WWW-Authenticate",
+    "X-Request-Id",
 )
 # Seconds that a browser keeps the answer to a preflight; none keeps it for longer.
 MAX_AGE = 7200
