@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from service import affineedit, affinesliders, bodyedit, bodysliders, deadline
+from service import affineedit, affinesliders, bodyedit, bodysliders
 from service.affineinference import AffineInference
 from service.bodyinference import BodyInference
 from service.constraints import NONE, Interval
@@ -17,11 +19,14 @@ from service.edits import Change
 from service.encode.affinemodel import AffineModel
 from service.encode.basemodel import Model
 from service.encode.bodymodel import BodyModel
+from service.encode.debugmodel import DebugModel
 from service.encode.recognition import recognise
-from service.errors import InvalidRequest, NotFound
+from service.encode.versions import choose
+from service.errors import InvalidRequest
 from service.inference import Inference
-from service.mesh.formats import read_mesh
-from service.mesh.frame import AUTO, orientations
+from service.inferences import Inferences
+from service.mesh.formats import detect, read_mesh
+from service.mesh.frame import AUTO, Orientation, orientations
 from service.mesh.meshfile import MeshFile
 from service.mesh.surface import Samples, Surface, sample_surface
 from service.requests import (
@@ -35,6 +40,7 @@ from service.requests import (
     require_units,
 )
 from service.skeleton import Skeleton
+from service.stages import stage
 
 
 @dataclass(frozen=True)
@@ -54,33 +60,34 @@ class _Kind:
     template: Callable[[Any, SliderOptions, str], bytes]
 
 
+_AFFINE = _Kind(AffineInference, affineedit.move, affinesliders.sliders, affinesliders.template)
 _KINDS = {
-    AffineModel.kind: _Kind(
-        AffineInference, affineedit.move, affinesliders.sliders, affinesliders.template
-    ),
+    AffineModel.kind: _AFFINE,
+    DebugModel.kind: _AFFINE,
     BodyModel.kind: _Kind(BodyInference, bodyedit.move, bodysliders.sliders, bodysliders.template),
 }
 
 
-def infer(upload: Upload, models: Mapping[str, Model], options: InferOptions) -> Inference:
+def infer(
+    upload: Upload,
+    models: Mapping[str, Model],
+    options: InferOptions,
+    known: Inferences | None = None,
+) -> Inference:
     """Infer the semantic parameters of an upload.
+
+    Args:
+        upload: a mesh file.
+        models: the categories.
+        options: what the client says of it.
+        known: inferences that may be used again, and where this one is kept.  Answers are the same
+            without, here and below.
 
     Raises:
         ShapeError: for a file that can't be served, or an option that makes no sense.
     """
-    chosen = _categories(models, options.category)
-    require_units(options.units)
-    ways = orientations(options.up, options.front)
-    mesh = read_mesh(upload.data, upload.name, upload.content_type)
-    deadline.check()
-    samples = {points: _sample(mesh, points) for points in {model.points for model in chosen}}
-    deadline.check()
-    # glTF is in metres whatever the client's unit; other files are in the unit it names.
-    unit = file_unit(mesh.format, options.units)
-    surface = Surface(mesh.vertices, mesh.faces, 1.0 / unit)
-    candidates = recognise(chosen, samples, ways, options.refine, surface)
-    kind = _KINDS[candidates[0].model.kind]
-    return kind.inference(upload, mesh, candidates, options.units, unit / UNITS[options.units])
+    with _inferred(upload, models, options, known) as found:
+        return found
 
 
 def edit(
@@ -90,6 +97,7 @@ def edit(
     edits: Mapping[str, Change],
     edit_options: EditOptions,
     constraints: Mapping[str, Interval] = NONE,
+    known: Inferences | None = None,
 ) -> Edited:
     """Edit an upload's parameters and move its vertices accordingly.
 
@@ -99,12 +107,11 @@ def edit(
         ShapeError: as `infer`, and for an edit that can't be made, or constraints that conflict.
     """
     _require_mode(edit_options.mode)
-    found = infer(upload, models, options)
-    _require_recognised(found, options.category)
-    keep = _anchor(found.model, edit_options.keep)
-    deadline.check()
-    moved = _KINDS[found.model.kind].move(found, edits, edit_options, keep, constraints)
-    return write_edited(moved, edit_options.format)
+    with _inferred(upload, models, options, known) as found:
+        _require_recognised(found, options.category)
+        keep = _anchor(found.model, edit_options.keep)
+        moved = _KINDS[found.model.kind].move(found, edits, edit_options, keep, constraints)
+        return write_edited(moved, edit_options.format)
 
 
 def sliders(
@@ -112,17 +119,17 @@ def sliders(
     models: Mapping[str, Model],
     options: InferOptions,
     slider_options: SliderOptions,
+    known: Inferences | None = None,
 ) -> bytes:
     """An upload as a GLB that holds its editing: morph targets, and a skeleton for a body.
 
     Raises:
         ShapeError: as `infer`, and for options that make no sense.
     """
-    found = infer(upload, models, options)
-    _require_recognised(found, options.category)
-    keep = _anchor(found.model, slider_options.keep)
-    deadline.check()
-    return _KINDS[found.model.kind].sliders(found, slider_options, keep)
+    with _inferred(upload, models, options, known) as found:
+        _require_recognised(found, options.category)
+        keep = _anchor(found.model, slider_options.keep)
+        return _KINDS[found.model.kind].sliders(found, slider_options, keep)
 
 
 def template(
@@ -130,50 +137,71 @@ def template(
     models: Mapping[str, Model],
     options: InferOptions,
     slider_options: SliderOptions,
+    known: Inferences | None = None,
 ) -> bytes:
     """What was fitted to an upload, as a GLB in its frame, with the same sliders.
 
     Raises:
         ShapeError: as `sliders`.
     """
-    found = infer(upload, models, options)
-    keep = _anchor(found.model, slider_options.keep)
-    deadline.check()
-    return _KINDS[found.model.kind].template(found, slider_options, keep)
+    with _inferred(upload, models, options, known) as found:
+        keep = _anchor(found.model, slider_options.keep)
+        return _KINDS[found.model.kind].template(found, slider_options, keep)
 
 
-def skeleton(upload: Upload, models: Mapping[str, Model], options: InferOptions) -> Skeleton:
+def skeleton(
+    upload: Upload,
+    models: Mapping[str, Model],
+    options: InferOptions,
+    known: Inferences | None = None,
+) -> Skeleton:
     """A body's upload, bound to the skeleton that was found in it.
 
     Raises:
         ShapeError: as `infer`, and when it is no body.
     """
-    found = infer(upload, models, options)
-    _require_recognised(found, options.category)
-    if not isinstance(found, BodyInference):
-        raise InvalidRequest(
-            "no_skeleton",
-            f"a {found.model.name} has no skeleton",
-            "Send a mesh of a category of bodies.",
-        )
-    deadline.check()
-    return Skeleton.of(found)
+    with _inferred(upload, models, options, known) as found:
+        _require_recognised(found, options.category)
+        if not isinstance(found, BodyInference):
+            raise InvalidRequest(
+                "no_skeleton",
+                f"a {found.model.name} has no skeleton",
+                "Send a mesh of a category of bodies.",
+            )
+        return Skeleton.of(found)
 
 
-def _categories(models: Mapping[str, Model], category: str) -> list[Model]:
-    if not models:
-        raise NotFound(
-            "no_models", "no model is installed", "Put models into the models folder and restart."
-        )
-    if category == AUTO:
-        return list(models.values())
-    if category not in models:
-        raise InvalidRequest(
-            "unknown_category",
-            f"no category is named {category[:80]!r}",
-            f"Use one of {', '.join(models)}, or auto.",
-        )
-    return [models[category]]
+def _inferred(
+    upload: Upload,
+    models: Mapping[str, Model],
+    options: InferOptions,
+    known: Inferences | None,
+) -> AbstractContextManager[Inference]:
+    """What is known of an upload, or is now found; within the block it may be asked for more."""
+    chosen = choose(models, options.category)
+    require_units(options.units)
+    ways = orientations(options.up, options.front)
+    find = partial(_find, upload, chosen, ways, options)
+    if known is None:
+        return nullcontext(find())
+    # Models are told apart as objects: those that were loaded anew may be others of the same name.
+    format = detect(upload.data, upload.name, upload.content_type)
+    return known.held((upload.mesh_id, format, options, *chosen), find)
+
+
+def _find(
+    upload: Upload, models: Sequence[Model], ways: Sequence[Orientation], options: InferOptions
+) -> Inference:
+    with stage("read"):
+        mesh = read_mesh(upload.data, upload.name, upload.content_type)
+    # glTF is in metres whatever the client's unit; other files are in the unit it names.
+    unit = file_unit(mesh.format, options.units)
+    with stage("encode"):
+        samples = {points: _sample(mesh, points) for points in {model.points for model in models}}
+        surface = Surface(mesh.vertices, mesh.faces, 1.0 / unit)
+        candidates = recognise(models, samples, ways, options.refine, surface)
+    kind = _KINDS[candidates[0].model.kind]
+    return kind.inference(upload, mesh, candidates, options.units, unit / UNITS[options.units])
 
 
 def _require_recognised(found: Inference, category: str) -> None:

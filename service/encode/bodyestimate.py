@@ -15,6 +15,7 @@ from service.encode.bodysamples import COUNT, LOG_SCALE, SHAPE, BodySamples
 from service.encode.distance import PROBES, Cloud, inside_out, mesh_distance
 from service.mesh.frame import Orientation, orientations
 from service.mesh.surface import Normalization, Samples
+from service.stages import stage
 from service.template.skinned import SHAPES, Body, SkinnedTemplate
 
 Array = NDArray[np.float64]
@@ -115,8 +116,9 @@ def estimate_body(
     sigma = np.full(3 * COUNT + SHAPES, SIGMA_ENCODER)
     if not refined:
         return BodyEstimate(start, sigma, distance, distance, normalization, turned)
-    fit = fit_body(template, replace(anchor, body=start), cloud, ROUGH if rough else settings)
-    final = mesh_distance(template.decode(fit.body), template.faces, cloud)
+    with stage("refine"):
+        fit = fit_body(template, replace(anchor, body=start), cloud, ROUGH if rough else settings)
+        final = mesh_distance(template.decode(fit.body), template.faces, cloud)
     spread = np.sqrt(np.diag(fit.covariance))[:LOG_SCALE]
     spread[SHAPE] = np.maximum(spread[SHAPE], SIGMA_FLOOR)
     return BodyEstimate(
@@ -134,7 +136,8 @@ def _best_anchor(model: BodyEncoder, samples: Samples, cloud: Cloud) -> tuple[An
     anchors = []
     for index in tried:
         way = ways[index]
-        encoding = model.encode(way.to_canonical(cloud.points)).turned(way.rotation.T)
+        with stage("encode"):
+            encoding = model.encode(way.to_canonical(cloud.points)).turned(way.rotation.T)
         anchors.append(Anchor(encoding.joints, encoding.body(template)))
     starts = [posed_by(template, anchor) for anchor in anchors]
     turned = opposes(template, starts[0], cloud)
@@ -143,8 +146,9 @@ def _best_anchor(model: BodyEncoder, samples: Samples, cloud: Cloud) -> tuple[An
     facing = Cloud(cloud.points, -cloud.normals) if turned else cloud
     worths = []
     for index, anchor, start in zip(tried, anchors, starts, strict=True):
-        fit = fit_body(template, replace(anchor, body=start), facing, ROUGH)
-        distance = mesh_distance(template.decode(fit.body), template.faces, facing)
+        with stage("refine"):
+            fit = fit_body(template, replace(anchor, body=start), facing, ROUGH)
+            distance = mesh_distance(template.decode(fit.body), template.faces, facing)
         worths.append(float(odds[index]) - STEEPNESS * np.log(distance))
     return anchors[int(np.argmax(worths))], turned
 

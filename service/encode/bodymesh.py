@@ -17,6 +17,7 @@ from service.encode.correspondence import fit_vertices
 from service.encode.distance import Cloud, mesh_distance
 from service.encode.meshencoder import MeshEncoder
 from service.mesh.surface import Normalization, Samples
+from service.stages import stage
 from service.template.skinned import NAMES, SkinnedTemplate
 
 Array = NDArray[np.float64]
@@ -43,7 +44,8 @@ def estimate_mesh(
     """
     normalization = Normalization.of(samples.points)
     own = normalization.apply(vertices)
-    start = encoder.encode(own)
+    with stage("encode"):
+        start = encoder.encode(own)
     cloud = Cloud(normalization.apply(samples.points), samples.normals)
     inside_out = opposes(template, start, cloud)
     if inside_out:
@@ -55,7 +57,8 @@ def estimate_mesh(
     known = None if metre is None else normalization.scale * metre
     if known is not None and not PLAUSIBLE[0] < known / start.scale < PLAUSIBLE[1]:
         known = None
-    fit = fit_vertices(template, start, own, None if known is None else float(np.log(known)))
-    final = mesh_distance(template.decode(fit.body), template.faces, cloud)
+    with stage("refine"):
+        fit = fit_vertices(template, start, own, None if known is None else float(np.log(known)))
+        final = mesh_distance(template.decode(fit.body), template.faces, cloud)
     sigma = np.hypot(np.sqrt(np.diag(fit.covariance))[:LOG_SCALE], SIGMA_FLOOR)
     return BodyEstimate(fit.body, sigma, final, distance, normalization, inside_out)

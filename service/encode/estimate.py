@@ -13,6 +13,7 @@ from service.encode.basemodel import STEEPNESS
 from service.encode.distance import PROBES, Cloud, inside_out, surface_distance
 from service.encode.refine import STANDARD, Settings, refine
 from service.mesh.surface import Normalization, Samples, sample_surface
+from service.stages import stage
 from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
@@ -91,7 +92,8 @@ def estimate(
     """
     normalization = Normalization.of(samples.points)
     points = normalization.apply(samples.points)
-    encoding = model.encode(points)
+    with stage("encode"):
+        encoding = model.encode(points)
     order = np.argsort(-encoding.shares, kind="stable")
     likeliest = model.template.variants[order[0]]
     # Samples come in the order of the faces, so that every so-many-th is a fair draw.
@@ -131,8 +133,9 @@ def _encoded(
 
 def _refined(start: Estimate, cloud: Cloud, settings: Settings, scale: Array) -> Estimate:
     """A fit from the encoder's answer on, unless it goes astray; its sigma is times ``scale``."""
-    fit = refine(start.template, start.parameters, start.translation, cloud, settings)
-    distance = surface_distance(start.template, fit.parameters, fit.translation, cloud)
+    with stage("refine"):
+        fit = refine(start.template, start.parameters, start.translation, cloud, settings)
+        distance = surface_distance(start.template, fit.parameters, fit.translation, cloud)
     if distance > DIVERGED * start.distance:
         return start
     return replace(

@@ -13,6 +13,7 @@ from service.encode.straighten import leans
 from service.mesh.frame import CANONICAL, Orientation
 from service.mesh.frame import orientations as all_orientations
 from service.mesh.surface import Normalization, Samples, Surface
+from service.stages import stage
 
 CUSTOM = {CANONICAL: 3.0, Orientation("+z", "-y"): 1.5}
 """How much likelier than others the orientations are that most files keep to: glTF's, Blender's.
@@ -92,7 +93,8 @@ def recognise(
     else:
         fitted = _weighed([view.candidate(refined=True) for view in views[:finalists]])
         listed = [*fitted, *(view.candidate(refined=False) for view in views[finalists:LISTED])]
-    best = straightened(settled(listed[0], samples, orientations))
+    with stage("refine"):
+        best = straightened(settled(listed[0], samples, orientations))
     whole = surface and surface.turned(best.orientation)
     answer = best.model.estimate(best.samples, refined, surface=whole)
     return [replace(best, estimate=answer), *listed[1:]]
