@@ -26,7 +26,7 @@ Formats: `.glb`, `.gltf`, `.obj`, `.ply`, `.stl`, `.off`, or a `.zip` with one o
 that belong to it: a `.gltf` with its `.bin`, an `.obj` with its materials and textures. Form fields
 are text: `true` may be `1` and `false` `0`, and an empty field is as good as none. Every error
 is an `application/problem+json` with a stable `code`, a `detail` and a `suggestion`. Every answer
-has a `Trace-Id`.
+has a `Trace-Id`, an `X-Request-Id`, and in `Server-Timing` what its time went into.
 """
 
 TAGS = [
