@@ -10,8 +10,8 @@ import h11
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from service.api.observe import PROBES
 from service.api.problems import Problem
+from service.api.routes import PROBES
 
 if TYPE_CHECKING:
     import asyncio

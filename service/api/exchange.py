@@ -55,7 +55,7 @@ class Exchange:
         message = await self._receive()
         if message["type"] == "http.request":
             self.request_bytes += len(message.get("body", b""))
-            if not message.get("more_body", False):
+            if self.receiving is None and not message.get("more_body", False):
                 self.receiving = self.seconds
         elif self._status is None:
             self._left = True

@@ -12,11 +12,8 @@ from service import logs
 from service.api import tracing
 from service.api.exchange import Exchange
 from service.api.metrics import Metrics
-from service.api.routes import Routes
+from service.api.routes import PROBES, Routes
 from service.api.trace import REQUEST_HEADER, request_id, trace_id
-
-PROBES = frozenset({"/livez", "/metrics", "/readyz"})
-"""Routes that machines ask every few seconds: of no interest but to who debugs them."""
 
 LONGEST_PATH = 200
 LONGEST_AGENT = 120

@@ -12,6 +12,9 @@ from starlette.routing import BaseRoute, Route
 UNMATCHED = "unmatched"
 """What is no path of the service."""
 
+PROBES = frozenset({"/livez", "/metrics", "/readyz"})
+"""Routes that machines ask every few seconds: of no interest but to who debugs them."""
+
 
 class Routes:
     """The templates of an app's paths; they are few, whatever clients ask for."""

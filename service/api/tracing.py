@@ -15,15 +15,15 @@ from fastapi.telemetry import TelemetryConfig
 from opentelemetry import trace
 from starlette.types import Scope
 
+from service.api.routes import PROBES
 from service.logs import Identity
 from service.stages import Record
 
 SERVICE_NAME = "shape-parameters"
-UNTRACED = frozenset({"/livez", "/metrics", "/readyz"})
 
 
-def _is_untraced(scope: MutableMapping[str, Any]) -> bool:
-    return scope.get("path") in UNTRACED
+def _is_probe(scope: MutableMapping[str, Any]) -> bool:
+    return scope.get("path") in PROBES
 
 
 TELEMETRY: TelemetryConfig = {
@@ -34,7 +34,7 @@ TELEMETRY: TelemetryConfig = {
     "metrics": False,
     # A span for each dependency of each route tells an operator little.
     "operation_spans": False,
-    "exclude": _is_untraced,
+    "exclude": _is_probe,
 }
 
 
