@@ -48,6 +48,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         where = f"{settings.host}:{settings.port}"
         print(f"{parser.prog}: can't listen on {where} (HOST, PORT): {error}", file=sys.stderr)
         return 1
+    # Threads that work give the event loop its turn after 1 ms rather than 5: an answer to a probe
+    # takes some six turns.
+    sys.setswitchinterval(0.001)
     server = Server(Config(app, settings), app.state.context)
     server.run(listeners)
     if not server.complete:

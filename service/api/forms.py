@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from io import BytesIO
 from typing import Annotated, Any, Literal
 
 from fastapi import File, Request, UploadFile
@@ -226,7 +227,7 @@ async def upload_of(request: Request, form: InferForm, store: MeshStore) -> Uplo
             "Send each field once.",
         )
     if form.mesh is not None:
-        return Upload(await form.mesh.read(), form.mesh.filename, form.mesh.content_type)
+        return Upload(await _contents(form.mesh), form.mesh.filename, form.mesh.content_type)
     if form.mesh_id is not None:
         return await store.fetch(form.mesh_id, owner_of(request))
     raise InvalidRequest(
@@ -234,3 +235,9 @@ async def upload_of(request: Request, form: InferForm, store: MeshStore) -> Uplo
         "The form holds no mesh.",
         "Send the file as the part `mesh` (curl -F mesh=@chair.glb), or a `mesh_id`.",
     )
+
+
+async def _contents(file: UploadFile) -> bytes:
+    """Its bytes; a copy of them would hold up the event loop by 50 ms for 100 MB."""
+    buffer = getattr(file.file, "_file", None)
+    return buffer.getvalue() if isinstance(buffer, BytesIO) else await file.read()
