@@ -7,7 +7,7 @@ know: they are not told apart by client.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Lock
@@ -37,12 +37,17 @@ class Inferences:
 
     An inference grows as edits ask for more of it: it is measured again after each use.  Safe to
     use from several threads, which share what they are given: it never changes but by that.
+
+    Attributes:
+        capacity, size: bytes that entries may take, and that they take.
+        hits, misses: requests whose inference was there or being made, and those that made one.
     """
 
     def __init__(self, capacity: int) -> None:
         """`capacity` is in bytes of memory."""
         self.capacity = capacity
         self.size = 0
+        self.hits = self.misses = 0
         self._entries: OrderedDict[Hashable, _Entry] = OrderedDict()
         self._lock = Lock()
         self._flights = Flights()
@@ -57,22 +62,30 @@ class Inferences:
         Requests for one that is just being made wait for it.
         """
 
+        made = False
+
         def keep() -> Inference:
+            nonlocal made
+            made = True
             found = infer()
             self._settle(key, found)
             return found
 
         found = self._flights.join(key, lambda: self._look(key), keep)
+        self._count(hit=not made)
         try:
             yield found
         finally:
             self._settle(key, found)
 
-    def clear(self) -> None:
-        """Forget everything, as when other models are loaded."""
+    def retain(self, models: Iterable[Model]) -> None:
+        """Forget what others than these models have found: they are served no more."""
+        served = set(models)
         with self._lock:
-            self._entries.clear()
-            self.size = 0
+            for key, entry in list(self._entries.items()):
+                if not served.issuperset(c.model for c in entry.found.candidates):
+                    del self._entries[key]
+                    self.size -= entry.size
 
     def _look(self, key: Hashable) -> Inference | None:
         with self._lock:
@@ -81,6 +94,11 @@ class Inferences:
                 return None
             self._entries.move_to_end(key)
             return entry.found
+
+    def _count(self, hit: bool) -> None:
+        with self._lock:
+            self.hits += hit
+            self.misses += not hit
 
     def _settle(self, key: Hashable, found: Inference) -> None:
         """Put what an inference has become into the account, and forget what is too much."""

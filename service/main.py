@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 from importlib.metadata import version
+from itertools import chain
 
 import anyio
 from fastapi import FastAPI
@@ -45,7 +46,9 @@ from service.api.safety import SafetyHeaders
 from service.api.tracing import TELEMETRY
 from service.api.workers import Workers
 from service.encode.catalog import Catalog
+from service.encode.installed import Installed
 from service.encode.model import SHIPPED, load_models
+from service.inferences import Inferences
 from service.settings import MEBIBYTE, Settings
 from service.store.meshstore import MeshStore, open_store
 
@@ -113,14 +116,24 @@ def _context(settings: Settings) -> Context:
     pool = Workers(workers, settings.deadline_seconds)
     queue = workers if settings.queue is None else settings.queue
     admission = Admission(pool, queue, settings.max_pending_bytes)
-    store = _store(settings)
-    return Context(store, Readiness(catalog.load, pool), pool, admission, Metrics())
+    inferences = Inferences(_share_of_memory(settings.inference_cache_bytes))
+
+    def load() -> Installed:
+        installed = catalog.load()
+        inferences.retain(chain(*installed.versions.values()))
+        return installed
+
+    readiness = Readiness(load, pool)
+    return Context(_store(settings), inferences, readiness, pool, admission, Metrics())
+
+
+def _share_of_memory(asked: int | None) -> int:
+    """Bytes for a cache: as many as the operator says, else an eighth of what there is, or less."""
+    return min(256 * MEBIBYTE, memory_bytes() // 8) if asked is None else asked
 
 
 def _store(settings: Settings) -> MeshStore:
-    memory = settings.mesh_cache_bytes
-    if memory is None:
-        memory = min(256 * MEBIBYTE, memory_bytes() // 8)
+    memory = _share_of_memory(settings.mesh_cache_bytes)
     url = settings.store_url.get_secret_value() if settings.store_url else None
     return open_store(memory, settings.store_dir, settings.store_bytes, url)
 

@@ -70,6 +70,11 @@ class Settings(BaseSettings):
     """Memory for meshes that requests name by `mesh_id`, in bytes; the least recently used go. By
     default 256 MiB, or an eighth of the memory that the container may use if that is less."""
 
+    inference_cache_bytes: NonNegativeInt | None = None
+    """Memory for what was found of meshes - what they are, their parameters, what moves with
+    what - in bytes, so that further edits of one take a tenth of the time; the least recently used
+    goes. By default as for MESH_CACHE_BYTES."""
+
     store_dir: Path | None = None
     """Folder for the same meshes, which are then found again after a restart; it is made if there
     is none. Without it, nothing is ever written to a disk."""

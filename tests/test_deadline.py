@@ -110,11 +110,10 @@ def test_every_stage_looks_at_the_clock(
     pipeline.edit(upload, models, upright, change, EditOptions())
     stages = {caller: callers.count(caller) for caller in callers}
     assert stages["geometry.add"] == 1
-    assert stages["pipeline.infer"] == 2
     assert stages["refine.refine"] >= 20
-    assert stages["pipeline.edit"] == 1
-    assert stages["affineedit.move"] == 2
-    assert stages["unfold.unfold"] == 1
+    # At least one for each stage behind the queue, and another for the report.
+    assert stages["stages.stage"] >= 7
+    assert stages["unfold.unfold"] == 8
     assert stages["gltfpatch.apply"] >= 1
     for number in (1, 2, len(callers) // 2, len(callers)):
         over(number)

@@ -73,18 +73,19 @@ def test_the_command_serves_on_the_port_that_it_is_told() -> None:
         process.communicate(timeout=30)
 
 
-def test_meshes_take_an_eighth_of_a_small_containers_memory(
+def test_each_cache_takes_an_eighth_of_a_small_containers_memory(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def capacity(memory: int, **settings: Any) -> int:
+    def capacities(memory: int, **settings: Any) -> tuple[int, int]:
+        """Of meshes and of inferences."""
         monkeypatch.setattr(main, "memory_bytes", lambda: memory)
-        store = main.create_app(Settings(**settings)).state.context.store
-        return store.memory.capacity
+        context = main.create_app(Settings(**settings)).state.context
+        return context.store.memory.capacity, context.inferences.capacity
 
-    assert capacity(512 << 20) == 64 << 20
-    assert capacity(64 << 30) == 256 << 20
-    assert capacity(512 << 20, mesh_cache_bytes=5) == 5
-    assert capacity(512 << 20, mesh_cache_bytes=0) == 0
+    assert capacities(512 << 20) == (64 << 20, 64 << 20)
+    assert capacities(64 << 30) == (256 << 20, 256 << 20)
+    assert capacities(512 << 20, mesh_cache_bytes=5) == (5, 64 << 20)
+    assert capacities(512 << 20, inference_cache_bytes=0) == (64 << 20, 0)
 
 
 @pytest.mark.parametrize(

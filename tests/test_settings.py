@@ -16,6 +16,7 @@ GIVEN = {
     "DEFAULT_MODELS": "chair=1.0.0, human=2",
     "MAX_UPLOAD_BYTES": "5",
     "MESH_CACHE_BYTES": "0",
+    "INFERENCE_CACHE_BYTES": "9",
     "STORE_DIR": "/s",
     "STORE_BYTES": "7",
     "STORE_URL": "s3://bucket",
@@ -41,6 +42,7 @@ def test_the_defaults_serve_this_machine_only() -> None:
     assert (settings.host, settings.port) == ("127.0.0.1", 8000)
     assert settings.max_upload_bytes == 134217728
     assert settings.mesh_cache_bytes is None
+    assert settings.inference_cache_bytes is None
     assert settings.store_dir is None
     assert settings.store_bytes == 1073741824
     assert settings.store_url is None
@@ -67,6 +69,7 @@ def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
         default_models={"chair": "1.0.0", "human": "2"},
         max_upload_bytes=5,
         mesh_cache_bytes=0,
+        inference_cache_bytes=9,
         store_dir=Path("/s"),
         store_bytes=7,
         store_url=SecretStr("s3://bucket"),

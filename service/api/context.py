@@ -11,6 +11,7 @@ from service.api.admission import Admission
 from service.api.metrics import Metrics
 from service.api.readiness import Readiness
 from service.api.workers import Workers
+from service.inferences import Inferences
 from service.store.meshstore import MeshStore
 
 
@@ -19,6 +20,7 @@ class Context:
     """The service's state: what is kept, loaded and measured, who works, and who is let in."""
 
     store: MeshStore
+    inferences: Inferences
     readiness: Readiness
     workers: Workers
     admission: Admission

@@ -24,6 +24,7 @@ from service.constraints import NONE, parse_constraints
 from service.edits import parse_edits
 from service.encode.model import Model
 from service.errors import NotFound
+from service.inferences import Inferences
 from service.requests import Upload
 from service.store.meshstore import MeshStore
 
@@ -77,7 +78,8 @@ async def edit(
 ) -> Response:
     upload = await upload_of(request, form, shared.store)
     models = await shared.readiness.models()
-    return await shared.workers.run(request, _edit, request, form, upload, models, shared.store)
+    run, kept = shared.workers.run, (shared.store, shared.inferences)
+    return await run(request, _edit, request, form, upload, models, *kept)
 
 
 def _edit(
@@ -86,6 +88,7 @@ def _edit(
     upload: Upload,
     models: Mapping[str, Model],
     store: MeshStore,
+    known: Inferences,
 ) -> Response:
     inside = validator(request, upload, form, models)
     if (tag := _held(request, upload, store, inside)) is not None:
@@ -93,7 +96,7 @@ def _edit(
     edits = parse_edits(form.edits) if form.edits is not None else {}
     constraints = parse_constraints(form.constraints) if form.constraints is not None else NONE
     options = form.infer_options(), edits, form.edit_options()
-    edited = pipeline.edit(upload, models, *options, constraints)
+    edited = pipeline.edit(upload, models, *options, constraints, known)
     request.state.report = edited.report
     result = Upload(edited.data, edited_name(upload.name, edited.format), edited.media_type)
     accept = ",".join(request.headers.getlist("accept"))

@@ -17,6 +17,7 @@ from service.api.problems import documented
 from service.api.report_response import report_response
 from service.api.schemas import TAG_HEADERS, InferReport
 from service.encode.model import Model
+from service.inferences import Inferences
 from service.requests import Upload
 from service.store.meshstore import MeshStore
 
@@ -49,7 +50,8 @@ async def infer(
 ) -> Response:
     upload = await upload_of(request, form, shared.store)
     models = await shared.readiness.models()
-    return await shared.workers.run(request, _infer, request, form, upload, models, shared.store)
+    run, kept = shared.workers.run, (shared.store, shared.inferences)
+    return await run(request, _infer, request, form, upload, models, *kept)
 
 
 def _infer(
@@ -58,10 +60,11 @@ def _infer(
     upload: Upload,
     models: Mapping[str, Model],
     store: MeshStore,
+    known: Inferences,
 ) -> Response:
     inside = validator(request, upload, form, models)
     if inside in named(request) and not keep(request, store, upload):
         return not_modified(weak(inside), REVALIDATED)
-    report = pipeline.infer(upload, models, form.infer_options()).report()
+    report = pipeline.infer(upload, models, form.infer_options(), known).report()
     request.state.report = report
     return report_response(request, report, keep(request, store, upload), inside, REVALIDATED)

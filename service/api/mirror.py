@@ -32,6 +32,7 @@ class Mirror(Collector):
         yield from self._work()
         yield from self._models()
         yield from self._store()
+        yield from self._inferences()
 
     def _work(self) -> Iterator[Metric]:
         workers, admission = self._context.workers, self._context.admission
@@ -112,6 +113,16 @@ class Mirror(Collector):
                 )
             ],
         )
+
+    def _inferences(self) -> Iterator[Metric]:
+        known = self._context.inferences
+        yield _one("inference_cache_bytes", "What kept inferences take.", known.size)
+        yield _one("inference_cache_limit_bytes", "What they may take.", known.capacity)
+        yield _one("inference_cache_entries", "Inferences that are kept.", len(known))
+        hits = "Requests whose mesh was known, or just being looked at."
+        yield _counter("inference_cache_hits", hits, (), [((), known.hits)])
+        misses = "Requests whose mesh had to be looked at."
+        yield _counter("inference_cache_misses", misses, (), [((), known.misses)])
 
 
 def _one(name: str, help: str, value: float) -> Metric:

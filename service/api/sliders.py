@@ -18,11 +18,12 @@ from service.api.mesh_response import MEDIA_TYPES, mesh_response
 from service.api.problems import documented
 from service.api.schemas import BINARY, MESH_HEADERS
 from service.encode.model import Model
+from service.inferences import Inferences
 from service.requests import InferOptions, SliderOptions, Upload
 from service.store.meshstore import MeshStore
 
 GLB = MEDIA_TYPES[".glb"]
-Make = Callable[[Upload, Mapping[str, Model], InferOptions, SliderOptions], bytes]
+Make = Callable[[Upload, Mapping[str, Model], InferOptions, SliderOptions, Inferences], bytes]
 
 router = APIRouter(tags=["shapes"])
 
@@ -83,8 +84,8 @@ async def _answer(
 ) -> Response:
     upload = await upload_of(request, form, shared.store)
     models = await shared.readiness.models()
-    run = shared.workers.run
-    return await run(request, _made, request, form, upload, models, shared.store, make, suffix)
+    run, kept = shared.workers.run, (shared.store, shared.inferences)
+    return await run(request, _made, request, form, upload, models, *kept, make, suffix)
 
 
 def _made(
@@ -93,6 +94,7 @@ def _made(
     upload: Upload,
     models: Mapping[str, Model],
     store: MeshStore,
+    known: Inferences,
     make: Make,
     suffix: str,
 ) -> Response:
@@ -100,7 +102,7 @@ def _made(
     if inside in named(request):
         keep(request, store, upload)
         return not_modified(weak(inside), REVALIDATED)
-    data = make(upload, models, form.infer_options(), form.slider_options())
+    data = make(upload, models, form.infer_options(), form.slider_options(), known)
     keep(request, store, upload)
     result = Upload(data, derived_name(upload.name, suffix, "glb"), GLB)
     return mesh_response(request, result, weak(inside), REVALIDATED)

@@ -70,4 +70,5 @@ class Bound:
 def columns_of(jacobian: NDArray[np.floating], parameters: Iterable[int]) -> Columns:
     """The columns of ``jacobian [V, 3, d]`` of some of the parameters."""
     columns = {(axis, index): jacobian[:, axis, index] for index in parameters for axis in range(3)}
-    return {cell: np.ascontiguousarray(column) for cell, column in columns.items() if column.any()}
+    # A column that stayed a part of the Jacobian would keep all of it.
+    return {cell: column.copy() for cell, column in columns.items() if column.any()}

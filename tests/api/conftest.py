@@ -52,7 +52,7 @@ class PretendPipeline:
     work: Callable[[], None] = lambda: None
     calls: list[dict[str, Any]] = field(default_factory=list)
 
-    def infer(self, upload: Upload, models: Any, options: Any) -> Any:
+    def infer(self, upload: Upload, models: Any, options: Any, known: Any = None) -> Any:
         self.calls.append({"upload": upload, "models": models, "options": options})
         self.work()
         return SimpleNamespace(report=lambda: {"mesh_id": upload.mesh_id, "category": "stool"})
@@ -65,6 +65,7 @@ class PretendPipeline:
         edits: Any,
         edit_options: Any,
         constraints: Any = None,
+        known: Any = None,
     ) -> Any:
         self.calls.append({
             "upload": upload, "models": models, "options": options, "edits": edits,

@@ -16,6 +16,7 @@ from service.api.readiness import Readiness
 from service.api.workers import Workers
 from service.encode.installed import Installed
 from service.errors import ModelFault
+from service.inferences import Inferences
 from service.requests import Upload
 from service.store.meshstore import MeshStore, open_store
 
@@ -48,7 +49,8 @@ def mirrored(store: MeshStore, *looks: Installed | Exception) -> tuple[Context, 
     """A context whose models have been looked for so often, and what is seen of it."""
     workers = Workers(2)
     readiness = Readiness(Looks(*looks), workers)
-    context = Context(store, readiness, workers, Admission(workers, 3, 1000), Metrics())
+    admission = Admission(workers, 3, 1000)
+    context = Context(store, Inferences(1000), readiness, workers, admission, Metrics())
     registry = CollectorRegistry()
     registry.register(Mirror(context))
 
