@@ -12,6 +12,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.api.problems import Problem
 from service.api.routes import PROBES
+from service.api.safety import protect
 
 if TYPE_CHECKING:
     import asyncio
@@ -113,6 +114,7 @@ class Connection(H11Protocol):
         self.config.metrics.refuse(code)
         trace_id = secrets.token_hex(16)
         problem = Problem(status, code, detail, "Send a request anew.", trace_id)
+        protect(problem.headers, status)
         headers = [
             *problem.raw_headers,
             (b"trace-id", trace_id.encode()),
@@ -146,6 +148,7 @@ def _probes_only(app: ASGIApp, metrics: Metrics) -> ASGIApp:
             trace_id,
             {"Retry-After": "1", "Connection": "close", "Trace-Id": trace_id},
         )
+        protect(problem.headers, problem.status_code)
         metrics.refuse(problem.code)
         await problem(scope, receive, send)
 

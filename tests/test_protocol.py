@@ -80,6 +80,8 @@ def check(answer: Reply, status: int, code: str) -> None:
     assert answer.headers["content-type"] == "application/problem+json"
     assert answer.headers["trace-id"] == document["trace_id"]
     assert answer.headers["connection"] == "close"
+    assert answer.headers["cache-control"] == "no-store"
+    assert answer.headers["x-content-type-options"] == "nosniff"
     assert document["suggestion"]
 
 

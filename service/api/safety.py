@@ -16,8 +16,16 @@ HEADERS = {
 """What every answer has, unless its route says otherwise."""
 
 
+def protect(headers: MutableHeaders, status: int) -> None:
+    """Add `HEADERS` to an answer's, and keep caches from answering in the service's place."""
+    for name, value in HEADERS.items():
+        headers.setdefault(name, value)
+    # An answer may hang on a key, and an error on the moment.
+    headers.setdefault("Cache-Control", "no-store" if status >= 400 else "no-cache")
+
+
 class SafetyHeaders:
-    """Middleware: adds `HEADERS`, and keeps caches from answering in the service's place."""
+    """Middleware: lets no answer go without."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -25,12 +33,7 @@ class SafetyHeaders:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         async def safe(message: Message) -> None:
             if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in HEADERS.items():
-                    headers.setdefault(name, value)
-                # An answer may hang on a key, and an error on the moment.
-                keep = "no-store" if message["status"] >= 400 else "no-cache"
-                headers.setdefault("Cache-Control", keep)
+                protect(MutableHeaders(scope=message), message["status"])
             await send(message)
 
         await self.app(scope, receive, safe if scope["type"] == "http" else send)
