@@ -11,9 +11,12 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from anyio import to_thread
 from fastapi import APIRouter, Request
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
+
+from service.api.etags import held, not_modified, strong
 
 FOLDER = Path(__file__).parents[1] / "web"
 
@@ -71,17 +74,17 @@ def pages() -> dict[str, Page]:
 
 @router.get("/")
 async def viewer(request: Request) -> Response:
-    return _answer(request, "index.html")
+    return await _answer(request, "index.html")
 
 
 @router.get("/docs")
 async def docs(request: Request) -> Response:
-    return _answer(request, "docs.html")
+    return await _answer(request, "docs.html")
 
 
 @router.get("/web/{path:path}")
 async def static(request: Request, path: str) -> Response:
-    return _answer(request, path)
+    return await _answer(request, path)
 
 
 def _page(path: Path) -> Page:
@@ -108,19 +111,18 @@ def _inline_scripts(html: str) -> str:
     return " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
 
 
-def _answer(request: Request, name: str) -> Response:
-    page = pages().get(name)
+async def _answer(request: Request, name: str) -> Response:
+    # Packing them takes half a second, the first time.
+    page = (await to_thread.run_sync(pages)).get(name)
     if page is None:
         raise HTTPException(404)
     packs = page.packed is not None and _takes_gzip(request.headers.get("accept-encoding", ""))
     # The two encodings are two representations: strong tags must differ.
     suffix = "-gzip" if packs else ""
-    tag = f'"{page.digest}{suffix}"'
+    tag = strong(f"{page.digest}{suffix}")
+    if held(request, tag):
+        return not_modified(tag, page.headers)
     headers = {**page.headers, "ETag": tag}
-    asked = request.headers.get("if-none-match", "").split(",")
-    held = {entry.strip().removeprefix("W/") for entry in asked}
-    if tag in held or "*" in held:
-        return Response(status_code=304, headers=headers)
     if packs:
         return Response(page.packed, headers={**headers, "Content-Encoding": "gzip"})
     return Response(page.plain, headers=headers)
