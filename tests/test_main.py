@@ -50,6 +50,27 @@ def test_a_setting_that_makes_no_sense_ends_the_command(
     assert "PORT='99999'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("CATEGORIES", "chair,sofa", "'sofa' does not come with the service; name some of"),
+        ("DEFAULT_MODELS", "chair@1.0.0", "is not of the form CATEGORY=VERSION"),
+    ],
+)
+def test_models_that_there_are_none_of_end_it_too(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    value: str,
+    told: str,
+) -> None:
+    monkeypatch.setenv(name, value)
+    assert __main__.main([]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"python -m service: {name}={value!r}: ")
+    assert told in error
+
+
 def test_the_command_serves_on_the_port_that_it_is_told() -> None:
     environment = {**os.environ, "PORT": "1", "HOST": "203.0.113.1"}
     process = subprocess.Popen(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import shutil
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import anyio
 import httpx
 import pytest
 import trimesh
@@ -139,3 +142,24 @@ def test_without_any_category_it_says_what_to_do(serve: Any, problem: Any) -> No
     assert client.post("/infer", files=BOX).status_code == 503
     document = problem(client.get("/readyz"), 503, "model_fault")
     assert "CATEGORIES" in document.suggestion
+
+
+def test_models_that_are_replaced_are_freed_whatever_is_kept_of_requests(
+    tmp_path: Path, serve: Any
+) -> None:
+    app = create_app(Settings(categories=(), models_dir=tmp_path))
+    write_model(tmp_path, "1.0.0")
+    client = serve(app)
+    readiness = app.state.context.readiness
+    sessions = []
+    for turn in range(5):
+        sent = client.post("/infer", files=BOX).json()
+        assert sent["model"]["version"] == f"1.{turn}.0"
+        edit = {"mesh_id": sent["mesh_id"], "edits": '{"width": 1}'}
+        assert client.post("/edit", data=edit).status_code == 200
+        sessions.append(weakref.ref(readiness.installed.models["debug"]._session._session))
+        write_model(tmp_path, f"1.{turn + 1}.0")
+        anyio.run(readiness.reload)
+    gc.collect()
+    assert [session() for session in sessions] == [None] * 5
+    assert readiness.installed.models["debug"].version == "1.5.0"
