@@ -90,10 +90,11 @@ def _log(exchange: Exchange, scope: Scope, headers: Headers) -> None:
     told = {name: value for name, value in fields.items() if value not in ("", None, {})}
     logger.log(
         level,
-        "%s %s %d in %.0f ms",
+        "%s %s %d%s in %.0f ms",
         exchange.method,
         path,
         exchange.status,
+        exchange.code and f" {exchange.code}",
         1e3 * exchange.seconds,
         extra={logs.FIELDS: told},
     )

@@ -145,7 +145,7 @@ def test_a_request_has_one_line_with_all_that_is_known(told: Told) -> None:
     _call(refuse, scope, _body(b""))
     (line,) = told.lines
     assert line["logger"] == "service.access"
-    assert line["message"].startswith("GET /meshes/a\\x0d\\x0ab 404 in ")
+    assert line["message"].startswith("GET /meshes/a\\x0d\\x0ab 404 mesh_id_unknown in ")
     assert line["path"] == "/meshes/a\\x0d\\x0ab"
     assert (line["method"], line["route"], line["status"]) == ("GET", "unmatched", 404)
     assert (line["code"], line["owner"], line["client"]) == (

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import socket
 import threading
+import time
 from typing import Any
 
 import httpx
@@ -23,6 +25,20 @@ def names(families: Any) -> set[str]:
     found: list[Metric] = list(families)
     assert len({family.name for family in found}) == len(found)
     return {family.name for family in found}
+
+
+def value(client: httpx.Client, name: str, **labels: str) -> float | None:
+    for family in parse(client.get("/metrics").text):
+        for sample in family.samples:
+            if (sample.name, sample.labels) == (f"shape_parameters_{name}", labels):
+                return sample.value
+    return None
+
+
+def until(client: httpx.Client, expected: float, name: str, **labels: str) -> None:
+    end = time.monotonic() + 30
+    while (found := value(client, name, **labels)) != expected:
+        assert time.monotonic() < end, f"{name} is {found}"
 
 
 @pytest.mark.parametrize("accept", ["*/*", "text/plain", "nonsense", "text/plain;version=0.0.4"])
@@ -63,16 +79,6 @@ def test_it_tells_of_requests_that_are_in_work_and_in_queue(
     pretend.work = work
     client = serve(pretend_app(workers=1, queue=1))
 
-    def value(name: str) -> float:
-        families = parse(client.get("/metrics").text)
-        return next(f.samples[0].value for f in families if f.name == f"shape_parameters_{name}")
-
-    def until(name: str, expected: float) -> None:
-        for _ in range(2000):
-            if value(name) == expected:
-                return
-        pytest.fail(f"{name} is {value(name)}")
-
     def send() -> None:
         client.post("/infer", files={"mesh": ("a.obj", b"abc")})
 
@@ -81,10 +87,10 @@ def test_it_tells_of_requests_that_are_in_work_and_in_queue(
         for thread in threads:
             thread.start()
         assert entered.acquire(timeout=30)
-        until("working_requests", 1)
-        until("queue_requests", 1)
+        until(client, 1, "working_requests")
+        until(client, 1, "queue_requests")
         # The two, and the one that asks.
-        until("open_requests", 3)
+        until(client, 3, "open_requests")
         refused = client.post("/infer", files={"mesh": ("a.obj", b"abc")})
         assert refused.status_code == 429
         text = client.get("/metrics").text
@@ -94,5 +100,41 @@ def test_it_tells_of_requests_that_are_in_work_and_in_queue(
         gate.set()
         for thread in threads:
             thread.join()
-    assert value("working_requests") == value("queue_requests") == 0
-    until("open_requests", 1)
+    until(client, 0, "working_requests")
+    until(client, 0, "queue_requests")
+    until(client, 1, "open_requests")
+
+
+def test_clients_that_leave_are_counted_and_leave_no_gauge_up(
+    pretend_app: Any, pretend: Any, serve: Any
+) -> None:
+    gate, entered = threading.Event(), threading.Semaphore(0)
+
+    def work() -> None:
+        entered.release()
+        assert gate.wait(30)
+
+    pretend.work = work
+    client = serve(pretend_app(workers=1, queue=1))
+    whole = client.build_request("POST", "/infer", files={"mesh": ("a.obj", b"abc")})
+    body = whole.read()
+    lines = [f"{name}: {value}" for name, value in whole.headers.items()]
+    head = "\r\n".join(["POST /infer HTTP/1.1", *lines, "", ""]).encode()
+    gone = {"route": "/infer", "method": "POST", "status": "499"}
+    address = client.base_url.host, client.base_url.port
+    try:
+        for number, sent in enumerate((body[:50], body)):
+            with socket.create_connection(address) as connection:
+                connection.sendall(head + sent)
+                if sent == body:
+                    assert entered.acquire(timeout=30)
+                else:
+                    until(client, 2, "open_requests")
+            if sent == body:
+                gate.set()
+            until(client, number + 1, "request_duration_seconds_count", **gone)
+    finally:
+        gate.set()
+    until(client, 0, "working_requests")
+    until(client, 1, "open_requests")
+    assert value(client, "request_duration_seconds_count", **gone | {"status": "500"}) is None
