@@ -3,7 +3,11 @@ PORT ?= 8000
 PYTHON ?= python3
 BIN = .venv/bin
 
-.PHONY: serve test chromium openapi clean
+ENGINE ?= docker
+IMAGE ?= shape-parameters
+BASE_IMAGE ?= python:3.11-slim-bookworm
+
+.PHONY: serve test chromium openapi lock image image-test clean
 
 serve: .venv/serve  ## run the service on HOST:PORT
 	@HOST=$(HOST) PORT=$(PORT) $(BIN)/python -m service
@@ -28,6 +32,22 @@ chromium:
 
 openapi: .venv/serve  ## write openapi.yaml anew
 	$(BIN)/python -m service.api.openapi > openapi.yaml
+
+LOCK = uv pip compile --quiet --upgrade --generate-hashes --python-version 3.11 \
+  --python-platform linux --custom-compile-command "make lock"
+
+lock:  ## pin anew what the image is made from; needs uv
+	$(LOCK) pyproject.toml --extra otel --extra shared -o docker/requirements.lock
+	$(LOCK) docker/build.in -o docker/build.lock
+
+# Podman's own format has no health checks.
+image:  ## build the image with ENGINE, docker or podman
+	BUILDAH_FORMAT=docker $(ENGINE) build -f docker/Dockerfile -t $(IMAGE) \
+	  --build-arg BASE_IMAGE=$(BASE_IMAGE) --build-arg REVISION=$$(git rev-parse HEAD) \
+	  --build-arg VERSION=$$(sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml) .
+
+image-test: .venv/dev  ## build the image, run it confined, and try it; minutes
+	$(BIN)/python tests/docker/run.py --engine $(ENGINE) --base $(BASE_IMAGE)
 
 clean:  ## remove the environment
 	rm -rf .venv
