@@ -249,6 +249,28 @@ def test_a_disk_that_fails_is_counted_and_never_raises(
     assert put(disk, numbered(9))
 
 
+def test_the_file_is_synced_before_it_is_renamed_and_the_folder_after(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = Disk(tmp_path, AMPLE)
+    steps = []
+    sync, replace = os.fsync, os.replace
+
+    def synced(descriptor: int) -> None:
+        facts = os.fstat(descriptor)
+        steps.append("folder" if stat.S_ISDIR(facts.st_mode) else facts.st_size)
+        sync(descriptor)
+
+    def renamed(source: Path, target: Path) -> None:
+        steps.append("rename")
+        replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(os, "replace", renamed)
+    put(disk, mesh(b"abc"))
+    assert steps == [files(tmp_path)[0].stat().st_size, "rename", "folder"]
+
+
 def test_a_failed_sync_of_the_folder_promises_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -353,6 +375,23 @@ def test_a_full_disk_keeps_what_it_has_and_goes_on_once_there_is_room(small_disk
     filler.unlink()
     assert put(disk, numbered(2, 100_000))
     disk.close()
+
+
+def test_a_read_only_disk_serves_what_it_has(small_disk: Path) -> None:
+    disk = Disk(small_disk, AMPLE)
+    kept = mesh(b"abc")
+    put(disk, kept)
+    disk.close()
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    disk = Disk(small_disk, AMPLE)
+    assert get(disk, kept) == kept
+    assert put(disk, kept)
+    assert not put(disk, mesh(b"def"))
+    assert (disk.entries, disk.tally.write_failures) == (1, 1)
+    # Even a budget that is overdrawn is no reason not to start.
+    assert get(Disk(small_disk, 0), kept) == kept
+    with pytest.raises(StoreFault, match="Read-only"):
+        Disk(small_disk / "new", AMPLE)
 
 
 PROGRAM = """
