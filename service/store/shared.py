@@ -20,11 +20,13 @@ from service.store.tally import Complaints, Tally
 SECONDS = 5.0
 """Longest wait for the store in one request."""
 AT_ONCE = 8
+"""Calls of it under way, hanging ones included."""
 PAUSE_S = 5.0
-"""How long a store that failed is left alone."""
+"""How long a store that failed is left alone at first."""
 FRESH_S = 600.0
 """How long an entry that was just written is not written again."""
 REMEMBERED = 4096
+"""Entries of which that is known."""
 
 
 class Shared:
@@ -41,8 +43,11 @@ class Shared:
     name = "shared"
 
     def __init__(self, url: str) -> None:
-        """Raises:
-        StoreFault: when fsspec or what it needs for the URL is not installed, or knows none such.
+        """Open it, without a call to it: it may be away for now.
+
+        Raises:
+            StoreFault: when fsspec or what it needs for the URL is not installed, or it knows no
+                such URL.
         """
         self.tally = Tally()
         self._complaints = Complaints(self.name)
