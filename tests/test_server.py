@@ -184,3 +184,9 @@ def test_where_it_listens() -> None:
     finally:
         for listener in listeners:
             listener.close()
+
+
+def test_no_answer_waits_for_the_client_to_acknowledge_its_head() -> None:
+    (listener,) = listen("127.0.0.1", 0)
+    with listener, socket.create_connection(listener.getsockname()), listener.accept()[0] as end:
+        assert end.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY) != 0
