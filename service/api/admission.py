@@ -6,6 +6,7 @@ import math
 import time
 from dataclasses import dataclass, field
 
+from anyio import sleep
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -15,6 +16,12 @@ from service.api.workers import Workers
 
 PROMPT_S = 1.0
 """Seconds within which a body comes on an ordinary network."""
+
+REFUSALS = 40
+"""Requests a second that are told at once that there is no room."""
+
+LONGEST_HOLD_S = 1.0
+"""How long those beyond are held before they are told, in seconds."""
 
 
 @dataclass(eq=False)
@@ -64,6 +71,7 @@ class Admission:
         self.rejected = {"places": 0, "bytes": 0}
         self._workers = workers
         self._inside: set[Request] = set()
+        self._told = -math.inf
 
     @property
     def held(self) -> int:
@@ -79,6 +87,17 @@ class Admission:
     def retry_after(self) -> int:
         """Whole seconds in which the workers get through what is here now, at least 1."""
         return max(1, math.ceil(self.held * self._workers.pace / self._workers.count))
+
+    def hold(self) -> float:
+        """Seconds to let a client wait that is to be refused now.
+
+        Refusals are cheap, not free: clients that come back at once, in spite of `Retry-After`,
+        would take the CPUs from those that are inside.
+        """
+        now = time.monotonic()
+        # A second's worth may go out at once.
+        self._told = min(max(self._told + 1 / REFUSALS, now - 1.0), now + LONGEST_HOLD_S)
+        return max(self._told - now, 0.0)
 
     def enter(self, declared: int) -> Request:
         """Let a request in whose body has so many bytes, as far as is known.
@@ -144,6 +163,7 @@ class Admit:
         try:
             request = self.admission.enter(int(length) if length.isdecimal() else 0)
         except HTTPException as error:
+            await sleep(self.admission.hold())
             await from_http(scope, error)(scope, receive, send)
             return
 

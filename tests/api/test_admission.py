@@ -51,6 +51,22 @@ def test_retry_after_is_the_work_ahead(pace: float, seconds: str) -> None:
     assert refused(lambda: gate.enter(0)).headers == {"Retry-After": seconds}
 
 
+def test_refusals_beyond_a_second_s_worth_are_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(admission, "REFUSALS", 10)
+    monkeypatch.setattr(admission.time, "monotonic", lambda: 100.0)
+    gate = Admission(Workers(1), 0, 1000)
+    assert [gate.hold() for _ in range(10)] == [0.0] * 10
+    holds = [gate.hold() for _ in range(20)]
+    assert holds == sorted(holds)
+    assert 0 < holds[2] < 0.5
+    assert holds[-1] == admission.LONGEST_HOLD_S
+    # A second later there is room again for one now and then.
+    monkeypatch.setattr(admission.time, "monotonic", lambda: 101.0)
+    assert 0 < gate.hold() <= 0.2
+    monkeypatch.setattr(admission.time, "monotonic", lambda: 103.0)
+    assert gate.hold() == 0.0
+
+
 def test_declared_bytes_are_held_up_front() -> None:
     gate = Admission(Workers(9), 0, 100)
     first = gate.enter(60)

@@ -70,22 +70,26 @@ async def prepared(port: int, meshes: Sequence[Mesh], routes: str) -> list[Call]
     return chosen
 
 
-async def run(port: int, calls: Sequence[Call], clients: int, seconds: float, wait: float) -> Tally:
+async def run(
+    port: int, calls: Sequence[Call], clients: int, seconds: float, wait: float, same: bool
+) -> Tally:
     """Let so many clients call, each again once it is answered.
 
     Args:
+        same: whether uploads may be those that the service has in its caches.
         wait: seconds that a client waits after a 429; below zero, as long as `Retry-After` says.
     """
     tally = Tally()
     start = time.perf_counter()
     end = start + seconds
-    turn = itertools.cycle(calls)
+    turn, numbers = itertools.cycle(calls), itertools.count(time.time_ns() // 1000)
 
     async def call_again() -> None:
         client = Client(port)
         while time.perf_counter() < end:
+            call = next(turn) if same else next(turn).numbered(next(numbers))
             try:
-                answer = await client.send(next(turn))
+                answer = await client.send(call)
             except (OSError, asyncio.IncompleteReadError) as error:
                 tally.failed.append(repr(error))
                 continue
@@ -151,6 +155,7 @@ def main() -> None:
     parser.add_argument(
         "--wait", type=float, default=-1.0, help="seconds after a 429; else as Retry-After says"
     )
+    parser.add_argument("--same", action="store_true", help="the same uploads again and again")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
     options = parser.parse_args()
     categories = options.categories.split(",")
@@ -158,6 +163,7 @@ def main() -> None:
         meshes = [read(options.mesh, categories[0], options.parameter)]
     else:
         meshes = [generated(category, options.vertices) for category in categories]
+    how = options.seconds, options.wait, options.same
     settings = dict(entry.split("=", 1) for entry in options.set)
     sizes = ", ".join(f"{mesh.name} {len(mesh.data) / 1e6:.1f} MB" for mesh in meshes)
     cpus = len(os.sched_getaffinity(0))
@@ -167,7 +173,7 @@ def main() -> None:
         print(HEAD, flush=True)
         alone = None
         for clients in map(int, options.clients.split(",")):
-            tally = asyncio.run(run(service.port, calls, clients, options.seconds, options.wait))
+            tally = asyncio.run(run(service.port, calls, clients, *how))
             print(row(clients, tally), flush=True)
             alone = alone or tally
             for failure in tally.failed[:3]:

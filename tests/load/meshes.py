@@ -12,10 +12,9 @@ from service.template.bodyfile import load_body
 from service.template.loader import load_template
 from service.template.skinned import body_of
 
-CATEGORIES = ("chair", "airplane", "human")
+from .client import GENERATOR
 
-# What exporters name themselves by: a number of the same length makes the file another one.
-_GENERATOR = b"https://github.com/mikedh/trimesh"
+CATEGORIES = ("chair", "airplane", "human")
 
 
 @dataclass(frozen=True)
@@ -26,10 +25,6 @@ class Mesh:
     name: str
     data: bytes
     parameter: str
-
-    def numbered(self, number: int) -> bytes:
-        """The file with a number in it: to the service's caches a file of its own."""
-        return self.data.replace(_GENERATOR, b"%0*d" % (len(_GENERATOR), number))
 
 
 def generated(category: str, vertices: int) -> Mesh:
@@ -51,7 +46,7 @@ def generated(category: str, vertices: int) -> Mesh:
         points, faces = trimesh.remesh.subdivide(points, faces)
     mesh = trimesh.Trimesh(points, faces, process=False)
     data = bytes(mesh.export(file_type="glb"))
-    assert _GENERATOR in data
+    assert GENERATOR in data
     return Mesh(category, f"{category}.glb", data, parameter)
 
 

@@ -36,24 +36,22 @@ class Mix:
         """Note the id under which the service keeps a mesh."""
         self._kept = [*self._kept[-7:], (mesh, answer.json()["mesh_id"])]
 
-    def mesh(self) -> tuple[Mesh, bytes]:
-        """A mesh, in half of the cases one that the service has never seen."""
-        mesh = self._random.choice(self._meshes)
-        self._number += 1
-        return mesh, mesh.numbered(self._number) if self._random.random() < 0.5 else mesh.data
-
     def work(self) -> tuple[Call, Mesh]:
         """A request that is answered with 200, or a 404 for an id that is gone."""
         path = self._random.choice(["/infer", "/infer", "/edit", "/edit", "/sliders", "/template"])
         if self._kept and self._random.random() < 0.4:
             mesh, mesh_id = self._random.choice(self._kept)
             return by_id(path, mesh_id, **self._fields(path, mesh)), mesh
-        mesh, data = self.mesh()
-        return upload(path, mesh.name, data, **self._fields(path, mesh)), mesh
+        mesh = self._random.choice(self._meshes)
+        call = upload(path, mesh.name, mesh.data, **self._fields(path, mesh))
+        self._number += 1
+        # Half of them are meshes that the service has never seen.
+        return call.numbered(self._number) if self._random.random() < 0.5 else call, mesh
 
     def mistake(self) -> Call:
         """A request that is answered with an error of the client's."""
-        mesh, data = self.mesh()
+        mesh = self._random.choice(self._meshes)
+        data = mesh.data
         broken = data[: self._random.randrange(len(data))]
         edits = json.dumps({"no_such_parameter": 1})
         return self._random.choice([
