@@ -102,11 +102,11 @@ def test_a_preflight_needs_no_key_but_the_call_does(
 
 
 def test_a_page_can_read_every_error(
-    make: Callable[..., httpx.Client], pretend: Any, problem: Any
+    pretend_app: Callable[..., FastAPI], serve: Any, pretend: Any, problem: Any
 ) -> None:
-    client = make(
-        cors_origins=PAGE, max_upload_bytes=2000, api_keys=str(Entry("a", digest_of(KEY)))
-    )
+    entry = str(Entry("ann", digest_of(KEY)))
+    app = pretend_app(cors_origins=PAGE, max_upload_bytes=2000, api_keys=entry)
+    client = serve(app)
 
     def fail() -> None:
         raise ZeroDivisionError
@@ -122,6 +122,8 @@ def test_a_page_can_read_every_error(
         (client.get("/nowhere", headers=key), 404, "not_found"),
         (client.put("/infer", headers=key), 405, "method_not_allowed"),
     ]
+    app.state.context.admission.places = 0
+    answers.append((client.post("/infer", files={"mesh": MESH}, headers=key), 429, "overloaded"))
     for response, status, code in answers:
         problem(response, status, code)
         assert response.headers["access-control-allow-origin"] == PAGE, code

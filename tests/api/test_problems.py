@@ -75,6 +75,7 @@ def test_a_path_that_is_not_there(client: httpx.Client, problem: Any) -> None:
         ("POST", "/livez", "GET, HEAD"),
         ("POST", "/", "GET, HEAD"),
         ("FOO", "/docs", "GET, HEAD"),
+        ("OPTIONS", "/web/js/app.js", "GET, HEAD"),
         ("TRACE", "/categories", "GET, HEAD"),
     ],
 )
@@ -84,6 +85,13 @@ def test_a_method_that_is_not_allowed(
     response = client.request(method, path)
     problem(response, 405, "method_not_allowed")
     assert response.headers["allow"] == allowed
+
+
+def test_a_head_of_what_is_only_posted_to(client: httpx.Client) -> None:
+    response = client.head("/infer")
+    assert (response.status_code, response.headers["allow"]) == (405, "POST")
+    assert response.headers["content-type"] == "application/problem+json"
+    assert response.content == b""
 
 
 @pytest.mark.parametrize(
