@@ -1,15 +1,21 @@
 from __future__ import annotations
 
+import gzip
 import os
+import re
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 import httpx
 import pytest
 from fastapi import FastAPI
+from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
 from opentelemetry.sdk.trace import ReadableSpan, TracerProvider
 from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
@@ -150,6 +156,72 @@ def test_no_sdk_is_loaded_where_nothing_is_traced() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
     )
     assert done.stdout == "False\n"
+
+
+class Collector(ThreadingHTTPServer):
+    """Takes what comes by OTLP over HTTP."""
+
+    def __init__(self) -> None:
+        super().__init__(("127.0.0.1", 0), _Take)
+        self.bodies: list[tuple[str, bytes]] = []
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.server_port}"
+
+
+class _Take(BaseHTTPRequestHandler):
+    server: Collector
+
+    def do_POST(self) -> None:
+        body = self.rfile.read(int(self.headers["content-length"]))
+        if self.headers.get("content-encoding") == "gzip":
+            body = gzip.decompress(body)
+        self.server.bodies.append((self.path, body))
+        self.send_response(200)
+        self.end_headers()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        pass
+
+
+@pytest.fixture
+def collector() -> Iterator[Collector]:
+    with Collector() as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
+
+
+def test_the_usual_variable_is_enough(collector: Collector) -> None:
+    environment = {
+        **os.environ,
+        "CATEGORIES": "debug",
+        "OTEL_EXPORTER_OTLP_ENDPOINT": collector.url,
+        "PORT": "0",
+        "NO_PROXY": "127.0.0.1",
+    }
+    process = subprocess.Popen(
+        [sys.executable, "-m", "service"], env=environment, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stderr is not None
+        lines = (re.search(r"running on (http://[0-9.:]+)", line) for line in process.stderr)
+        url = next(match[1] for match in lines if match)
+        answer = httpx.get(f"{url}/categories", trust_env=False, timeout=60)
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+    ((path, body),) = collector.bodies
+    assert path == "/v1/traces"
+    (told,) = ExportTraceServiceRequest.FromString(body).resource_spans
+    named = {entry.key: entry.value.string_value for entry in told.resource.attributes}
+    assert named["service.name"] == "shape-parameters"
+    (span,) = (span for scope in told.scope_spans for span in scope.spans)
+    assert span.name == "GET /categories"
+    assert span.trace_id.hex() == answer.headers["trace-id"]
 
 
 @pytest.mark.parametrize(
