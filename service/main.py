@@ -114,7 +114,7 @@ def _context(settings: Settings) -> Context:
     shipped = partial(load_models, SHIPPED, threads, body, settings.categories)
     catalog = Catalog(shipped, settings.models_dir, threads, body, settings.default_models)
     pool = Workers(workers, settings.deadline_seconds)
-    queue = workers if settings.queue is None else settings.queue
+    queue = max(1, workers // 2) if settings.queue is None else settings.queue
     admission = Admission(pool, queue, settings.max_pending_bytes)
     inferences = Inferences(_share_of_memory(settings.inference_cache_bytes))
 
