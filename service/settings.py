@@ -101,8 +101,8 @@ class Settings(BaseSettings):
     """Threads that infer and edit; by default one for every CPU that the process may use."""
 
     queue: NonNegativeInt | None = None
-    """Requests that may wait for a worker; by default one for every two. What comes beyond is answered
-    with 429, and when to come again."""
+    """Requests that may wait for a worker; by default one for every two. What comes beyond is
+    answered with 429, and when to come again."""
 
     max_pending_bytes: PositiveInt = 256 * MEBIBYTE
     """Request bodies held at once, in bytes; what comes beyond is answered with 429."""
