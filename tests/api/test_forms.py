@@ -17,7 +17,7 @@ def test_the_upload_reaches_the_pipeline_as_it_is(client: httpx.Client, pretend:
     upload = pretend.calls[0]["upload"]
     assert (upload.data, upload.name, upload.content_type) == (b"abc", "chair.obj", "model/obj")
     assert pretend.calls[0]["options"] == InferOptions()
-    assert list(pretend.calls[0]["models"]) == ["stool"]
+    assert list(pretend.calls[0]["models"]) == ["stool", "stool@1"]
 
 
 def test_the_options_reach_the_pipeline(client: httpx.Client, pretend: Any) -> None:
