@@ -12,11 +12,12 @@ from py_compile import PycInvalidationMode, compile
 
 import service
 
-# Chosen while the server runs.
+# Loaded only while the server runs.
 LATER = (
     "anyio._backends._asyncio",
     "opentelemetry.exporter.otlp.proto.http.trace_exporter",
     "opentelemetry.sdk.trace.export",
+    "trimesh",
     "uvicorn.lifespan.on",
     "uvicorn.loops.auto",
     "uvicorn.protocols.http.auto",
