@@ -26,8 +26,8 @@ from model_export.config import SHIPPED
 from model_export.detailed import NAMES, DetailedChair, detailed_chair
 from service.deform import blend, paper
 from service.deform.binding import Binding
-from service.deform.flips import count_flips
 from service.deform.followers import following
+from service.deform.turning import count_flips
 from service.encode.estimate import estimate
 from service.encode.model import Model, load_models
 from service.mesh.surface import Normalization, sample_surface

@@ -62,8 +62,8 @@ def _moved(
     fit, turn = found.fit, found.best.orientation
     change = outcome.change * found.scale
     _, anchor = fit.template.anchor(keep)
-    shift = turn.to_own((bound.displace(change) - anchor @ change) / fit.normalization.scale)
-    linear = turn.maps_to_own(bound.linear(change))
+    moved, linear = bound.displace(change), bound.linear(change)
+    shift = turn.to_own((moved - anchor @ change) / fit.normalization.scale)
     before = found.dimensions().derived(found.parameters)
     return Moved(
         found,
@@ -74,7 +74,8 @@ def _moved(
             for name, values in dimensions.measured(outcome.change).items()
         ],
         found.mesh.vertices + shift,
-        linear,
+        turn.maps_to_own(linear),
+        len(found.turning.flipped(moved, linear)),
         [*_warnings(found, outcome), *_measures(found, dimensions, outcome)],
     )
 

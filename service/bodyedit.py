@@ -58,7 +58,8 @@ def move(
             values = constrain(found, values, edits, constraints)
         after = standing(template, before, edited(before, values), keep)
         turn, scale = found.best.orientation, found.fit.normalization.scale
-        shift = turn.to_own((binding.move(before, after) - found.vertices) / scale)
+        moved = binding.move(before, after) - found.vertices
+        linear = binding.linear(before, after)
         rows = zip(NAMES, found.parameters.tolist(), values.tolist(), PARAMETER_UNITS, strict=True)
         statures = found.stature(before), found.stature(after)
         return Moved(
@@ -66,8 +67,9 @@ def move(
             [Shift(*row) for row in rows],
             [Shift(STATURE, *statures, found.unit)],
             [Measured(STATURE, *statures, found.unit, _asked(found, edits, constraints))],
-            found.mesh.vertices + shift,
-            turn.maps_to_own(binding.linear(before, after)),
+            found.mesh.vertices + turn.to_own(moved / scale),
+            turn.maps_to_own(linear),
+            len(found.turning.flipped(moved, linear)),
             _warnings(found.parameters, values),
         )
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.constraints import Interval
-from service.deform.flips import count_flips
 from service.inference import Inference
 from service.mesh.convert import convert
 from service.mesh.formats import MEDIA_TYPES
+from service.mesh.moves import any_of_rows
 from service.requests import file_unit
 from service.stages import stage
 
@@ -77,6 +77,7 @@ class Moved:
         dimensions: what the mesh itself measured and measures.
         vertices: ``[V, 3]`` new positions in the file's own frame.
         linear: ``[V, 3, 3]`` local linear maps, likewise.
+        flips: how many faces turn inside out.
         warnings: what the client should know of the edit.
     """
 
@@ -86,6 +87,7 @@ class Moved:
     dimensions: Sequence[Measured]
     vertices: Array
     linear: NDArray[np.floating]
+    flips: int
     warnings: Sequence[str]
 
 
@@ -112,7 +114,6 @@ def write_edited(moved: Moved, format: str | None) -> Edited:
 
 def _report(moved: Moved) -> dict[str, Any]:
     found, mesh = moved.found, moved.found.mesh
-    flips = count_flips(mesh.vertices, moved.vertices, mesh.faces, moved.linear)
     return {
         "category": found.model.name,
         "model": found.model.identity,
@@ -121,10 +122,10 @@ def _report(moved: Moved) -> dict[str, Any]:
         "dimensions": {measured.name: measured.report() for measured in moved.dimensions},
         "vertices": {
             "total": len(mesh.vertices),
-            "moved": int((moved.vertices != mesh.vertices).any(axis=1).sum()),
+            "moved": int(any_of_rows(moved.vertices != mesh.vertices).sum()),
         },
-        "flipped_faces": flips,
-        "warnings": [*found.warnings, *moved.warnings, *_folds(flips, len(mesh.faces))],
+        "flipped_faces": moved.flips,
+        "warnings": [*found.warnings, *moved.warnings, *_folds(moved.flips, len(mesh.faces))],
     }
 
 

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.deform.turning import Turning
 from service.encode.basemodel import Model
 from service.encode.recognition import Candidate
 from service.mesh.meshfile import MeshFile
 from service.once import Memo
 from service.requests import Upload
+from service.stages import stage
 
 Array = NDArray[np.float64]
 
@@ -76,6 +78,15 @@ class Inference(ABC):
         """``[V, 3]`` of the mesh in the normalised canonical frame."""
         canonical = self.best.orientation.to_canonical(self.mesh.vertices)
         return self.best.estimate.normalization.apply(canonical)
+
+    @property
+    def turning(self) -> Turning:
+        """How its faces turn when its vertices move, in that frame."""
+        return self.memo.get("turning", self._turning)
+
+    def _turning(self) -> Turning:
+        with stage("bind"):
+            return Turning(self.vertices, self.mesh.faces)
 
     @property
     @abstractmethod

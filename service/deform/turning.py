@@ -1,4 +1,4 @@
-"""How the faces of a mesh turn while its vertices move along one column of a Jacobian.
+"""How the faces of a mesh turn while its vertices move: along one column of a Jacobian, or away.
 
 A face whose sides are ``e1, e2`` and change by ``d1, d2`` a unit has, after a step s, the normal
 ``(e1 + s d1) x (e2 + s d2) = n0 + s n1 + s^2 n2``.  Few turn so far that they may have folded;
@@ -8,12 +8,13 @@ that is told of all in single precision, and only those few are looked at closel
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from service.deform.flips import counted, dot
+from service.deform.flips import counted, dot, wild
 from service.deform.gradient import Gradient
 from service.deform.normals import cross
 
@@ -29,6 +30,8 @@ BLOCK = 16384
 TURNED = 0.7
 """Squared share of a normal's length by which it may change without turning by 60 degrees, less
 than sin(60)^2 by what single precision may be off."""
+SLENDER = 1e-4
+"""Sine of a corner's angle from which on single precision tells a normal to a thousandth."""
 
 
 class Turning:
@@ -79,23 +82,60 @@ class Turning:
         folded[:, rows] = dot(turned, expected) < 0.0
         return folded
 
-    def _suspects(self, motion: Motion, wild: Mask, reach: float) -> Index:
-        """Faces that may fold in steps of up to `reach`."""
+    def flipped(self, moved: NDArray[np.floating], maps: NDArray[np.floating]) -> Index:
+        """Faces of some area whose normal turns against their old one carried by the maps.
+
+        Args:
+            moved: ``[n, 3]`` displacements.
+            maps: ``[n, 3, 3]`` local linear maps of the edit.
+
+        Returns:
+            Their indices, in order.
+        """
+        motion = {axis: column for axis, column in enumerate(moved.T) if column.any()}
+        rows = self._suspects(motion, wild(maps), 1.0, self._slender)
+        corners = self._corners[:, rows]
+        before = _sides(self._columns, corners)
+        after = before.copy()
+        for axis, column in motion.items():
+            after[:, axis] += _differences(column, corners)
+        a, b, c = (maps[corner] for corner in corners)
+        mean = ((a + b + c) / 3).transpose(1, 2, 0)
+        carried = cross(*((mean * side).sum(axis=1) for side in before))
+        return rows[dot(carried, cross(*after)) < 0.0]
+
+    @cached_property
+    def _slender(self) -> Mask:
+        """``[F]`` faces whose normals single precision knows hardly anything of."""
+        squared = dot(self._sides[0], self._sides[0]) * dot(self._sides[1], self._sides[1])
+        return np.asarray(self._room < TURNED * SLENDER**2 * squared)
+
+    def _suspects(
+        self, motion: Motion, wild: Mask, reach: float, others: Mask | None = None
+    ) -> Index:
+        """Faces that may fold in steps of up to `reach`, and ``[F]`` others."""
         columns = {axis: column.astype(np.float32, copy=False) for axis, column in motion.items()}
         found = np.zeros(self._corners.shape[1], bool)
         any_wild = bool(wild.any())
         for rows in self._blocks():
             corners, room = self._corners[:, rows], self._room[rows]
             changes = {axis: _differences(column, corners) for axis, column in columns.items()}
-            found[rows] = _change(self._sides[:, :, rows], changes, reach) > room
+            if changes:
+                found[rows] = _change(self._sides[:, :, rows], changes, reach) > room
             if any_wild:
                 a, b, c = corners
                 found[rows] |= (wild[a] | wild[b] | wild[c]) & (room < np.inf)
-        return np.flatnonzero(found)
+        return np.flatnonzero(found if others is None else found | others)
 
     def _blocks(self) -> list[slice]:
         count = self._corners.shape[1]
         return [slice(start, start + BLOCK) for start in range(0, count, BLOCK)]
+
+
+def count_flips(before: Array, after: Array, faces: Index, maps: NDArray[np.floating]) -> int:
+    """How many ``faces [F, 3]`` are flipped when vertices go from ``before`` to ``after [n, 3]``
+    and turn by ``maps [n, 3, 3]``."""
+    return len(Turning(before, faces).flipped(after - before, maps))
 
 
 def _sides(columns: Array, corners: Index) -> Array:

@@ -19,7 +19,7 @@ from planes import (
 from model_export.detailed import detailed_chair
 from service.deform.binding import Binding
 from service.deform.blend import bind
-from service.deform.flips import count_flips
+from service.deform.turning import count_flips
 
 
 def bound(mesh: tuple[np.ndarray, np.ndarray]) -> Binding:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from service.deform.flips import count_flips
+from service.deform.turning import count_flips
 
 SPHERE = trimesh.creation.icosphere(subdivisions=2)
 VERTICES = np.asarray(SPHERE.vertices, np.float64)

@@ -3,12 +3,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from service.deform.flips import flipped
+from service.deform.flips import counted
 from service.deform.gradient import Gradient
 from service.deform.turning import BLOCK, Turning
 
 STEPS = (-0.3, 0.4)
+
+
+def flipped(
+    before: NDArray[np.float64],
+    after: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    maps: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """The same by the whole formula."""
+    mean = maps[faces].mean(axis=1)
+    (a, b), (c, d) = (
+        (v[faces[:, 1]] - v[faces[:, 0]], v[faces[:, 2]] - v[faces[:, 0]]) for v in (before, after)
+    )
+    carried = np.cross(*(np.einsum("fij,fj->fi", mean, side) for side in (a, b)))
+    against = np.asarray((carried * np.cross(c, d)).sum(axis=1) < 0.0)
+    return against & counted(np.square(np.cross(a, b)).sum(axis=1))
 
 
 def rough(count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -63,3 +80,20 @@ def test_faces_without_area_do_not_count() -> None:
     motion = {2: np.random.default_rng(0).standard_normal(9)}
     found = Turning(vertices, faces).folded(motion, still, np.ones(9, bool), STEPS)
     assert not found[:, 1].any()
+
+
+@pytest.mark.parametrize("thin", [1.0, 1e-7])
+@pytest.mark.parametrize("strength", [0.0, 1.0, 3.0])
+@pytest.mark.parametrize("growth", [0.0, 1.5])
+def test_flips_are_those_of_the_whole_formula(thin: float, strength: float, growth: float) -> None:
+    vertices, faces = rough(40)
+    turn = Rotation.from_rotvec([0.3, 0.5, 0.7]).as_matrix()
+    vertices = vertices * [1.0, thin, 1.0] @ turn
+    rng = np.random.default_rng(2)
+    shift = 0.01 * rng.standard_normal(vertices.shape) * [1.0, thin, 1.0] @ turn
+    moved = strength * shift + growth * vertices
+    maps = np.eye(3) * (1.0 + growth) + 0.2 * strength * rng.standard_normal((len(vertices), 3, 3))
+    found = Turning(vertices, faces).flipped(moved, maps)
+    expected = np.flatnonzero(flipped(vertices, vertices + moved, faces, maps))
+    assert (strength > 0.0) == (20 < len(expected) < len(faces))
+    np.testing.assert_array_equal(found, expected)

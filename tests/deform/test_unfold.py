@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from service.deform.binding import Binding
-from service.deform.flips import count_flips
+from service.deform.turning import count_flips
 from service.deform.unfold import FARTHEST, unfold
 
 SIZE = 24
