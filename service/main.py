@@ -115,7 +115,7 @@ def _context(settings: Settings) -> Context:
     catalog = Catalog(shipped, settings.models_dir, threads, body, settings.default_models)
     pool = Workers(workers, settings.deadline_seconds)
     queue = max(1, workers // 2) if settings.queue is None else settings.queue
-    admission = Admission(pool, queue, settings.max_pending_bytes)
+    admission = Admission(pool, queue, _share_of_memory(settings.max_pending_bytes))
     inferences = Inferences(_share_of_memory(settings.inference_cache_bytes))
 
     def load() -> Installed:
@@ -123,12 +123,12 @@ def _context(settings: Settings) -> Context:
         inferences.retain(chain(*installed.versions.values()))
         return installed
 
-    readiness = Readiness(load, pool)
+    readiness = Readiness(load)
     return Context(_store(settings), inferences, readiness, pool, admission, Metrics())
 
 
 def _share_of_memory(asked: int | None) -> int:
-    """Bytes for a cache: as many as the operator says, else an eighth of what there is, or less."""
+    """Bytes for a cache or for bodies: as many as the operator says, else an eighth of what there is, or less."""
     return min(256 * MEBIBYTE, memory_bytes() // 8) if asked is None else asked
 
 

@@ -6,8 +6,8 @@ import logging
 from collections.abc import Callable, Mapping
 
 import anyio
+from anyio import to_thread
 
-from service.api.workers import Workers
 from service.encode.catalog import Installed
 from service.encode.model import Model
 from service.errors import ModelFault, ShapeError
@@ -31,10 +31,9 @@ class Readiness:
         reloads: how often the models were loaded anew, by result.
     """
 
-    def __init__(self, load: Load, workers: Workers) -> None:
+    def __init__(self, load: Load) -> None:
         """`load` finds verified models; it may be called again, but never twice at once."""
         self._load = load
-        self._workers = workers
         self.draining = False
         self.reloads = {"success": 0, "failure": 0}
         self._started = False
@@ -48,7 +47,7 @@ class Readiness:
         self.draining = True
 
     async def start(self) -> None:
-        """Load every model and put its golden request to it, in a worker thread."""
+        """Load every model and put its golden request to it, in a thread."""
         self._started = True
         try:
             self._installed = await self._look()
@@ -80,7 +79,8 @@ class Readiness:
 
     async def _look(self) -> Installed:
         async with self._reloading:
-            installed = await self._workers.run(None, self._load)
+            # Not by a worker: a reload neither waits for requests nor holds them up.
+            installed = await to_thread.run_sync(self._load)
         for fault in installed.faults:
             logger.error("not served: %s", fault)
         if not installed.models:

@@ -48,7 +48,7 @@ def store(tmp_path: Path) -> MeshStore:
 def mirrored(store: MeshStore, *looks: Installed | Exception) -> tuple[Context, CollectorRegistry]:
     """A context whose models have been looked for so often, and what is seen of it."""
     workers = Workers(2)
-    readiness = Readiness(Looks(*looks), workers)
+    readiness = Readiness(Looks(*looks))
     admission = Admission(workers, 3, 1000)
     context = Context(store, Inferences(1000), readiness, workers, admission, Metrics())
     registry = CollectorRegistry()

@@ -1,14 +1,16 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 
 import anyio
 import pytest
+from fastapi import FastAPI
 
 from service.api.readiness import Readiness
-from service.api.workers import Workers
 from service.encode.catalog import Installed
 from service.errors import ModelFault
 
@@ -24,14 +26,14 @@ def fault_of(readiness: Readiness) -> ModelFault:
 
 
 def test_before_the_start_it_is_starting() -> None:
-    assert fault_of(Readiness(lambda: Installed({"stool": model()}), Workers(1))).code == "starting"
+    assert fault_of(Readiness(lambda: Installed({"stool": model()}))).code == "starting"
 
 
 def test_models_that_verify_are_handed_out() -> None:
     stool = model()
 
     async def start_and_ask() -> Any:
-        readiness = Readiness(lambda: Installed({"stool": stool}), Workers(1))
+        readiness = Readiness(lambda: Installed({"stool": stool}))
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(readiness.start)
             return await readiness.models()
@@ -60,7 +62,7 @@ def raise_unforeseen() -> Any:
     ],
 )
 def test_one_bad_model_is_a_fault_with_its_reason(load: Any, detail: str) -> None:
-    readiness = Readiness(load, Workers(1))
+    readiness = Readiness(load)
     anyio.run(readiness.start)
     fault = fault_of(readiness)
     assert fault.code == "model_fault"
@@ -76,7 +78,7 @@ def test_a_request_waits_for_the_start_only_so_long(monkeypatch: pytest.MonkeyPa
         return Installed({"stool": model()})
 
     async def ask_twice() -> Any:
-        readiness = Readiness(load, Workers(1))
+        readiness = Readiness(load)
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(readiness.start)
             await anyio.sleep(0)
@@ -99,7 +101,7 @@ def test_without_a_lifespan_the_first_request_is_the_start() -> None:
         return Installed({"stool": model()})
 
     async def ask_twice() -> Any:
-        readiness = Readiness(load, Workers(1))
+        readiness = Readiness(load)
         return [list(await readiness.models()), list(await readiness.models())]
 
     assert anyio.run(ask_twice) == [["stool"], ["stool"]]
@@ -109,7 +111,7 @@ def test_without_a_lifespan_the_first_request_is_the_start() -> None:
 def reloaded(*looks: Any) -> Readiness:
     """Started at the first look, then reloaded for each further one."""
     finds = iter(looks)
-    readiness = Readiness(lambda: next(finds)(), Workers(1))
+    readiness = Readiness(lambda: next(finds)())
 
     async def start_and_reload() -> None:
         await readiness.start()
@@ -140,13 +142,13 @@ def test_a_reload_that_fails_keeps_what_was_there(look: Any) -> None:
 
 def test_a_reload_can_make_good_a_failed_start() -> None:
     assert reloaded(raise_golden, lambda: Installed({"stool": model()})).names == ["stool"]
-    assert Readiness(lambda: Installed({}), Workers(1)).names == []
+    assert Readiness(lambda: Installed({})).names == []
 
 
 def test_requests_keep_the_models_that_they_began_with() -> None:
     old, new = model(), model()
     finds = iter([Installed({"stool": old}), Installed({"stool": new})])
-    readiness = Readiness(lambda: next(finds), Workers(1))
+    readiness = Readiness(lambda: next(finds))
 
     async def reload_within_a_request() -> Any:
         await readiness.start()
@@ -155,3 +157,27 @@ def test_requests_keep_the_models_that_they_began_with() -> None:
         return models, await readiness.models()
 
     assert anyio.run(reload_within_a_request) == ({"stool": old}, {"stool": new})
+
+
+def test_a_reload_waits_for_no_worker(
+    pretend: Any, pretend_app: Callable[..., FastAPI], serve: Any
+) -> None:
+    begun, release = threading.Event(), threading.Event()
+
+    def work() -> None:
+        begun.set()
+        release.wait(20)
+
+    pretend.work = work
+    app = pretend_app(workers=1)
+    client = serve(app)
+    with ThreadPoolExecutor() as pool:
+        answer = pool.submit(client.post, "/infer", files={"mesh": ("a.obj", b"abc")})
+        try:
+            assert begun.wait(20)
+            anyio.run(app.state.context.readiness.reload)
+            assert app.state.context.readiness.reloads == {"success": 1, "failure": 0}
+            assert not answer.done()
+        finally:
+            release.set()
+        assert answer.result().status_code == 200
