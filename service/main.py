@@ -128,7 +128,7 @@ def _context(settings: Settings) -> Context:
 
 
 def _share_of_memory(asked: int | None) -> int:
-    """Bytes for a cache or for bodies: as many as the operator says, else an eighth of what there is, or less."""
+    """Bytes of memory: as many as the operator says, else an eighth of all, or less."""
     return min(256 * MEBIBYTE, memory_bytes() // 8) if asked is None else asked
 
 

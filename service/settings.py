@@ -104,8 +104,9 @@ class Settings(BaseSettings):
     """Requests that may wait for a worker; by default one for every two. What comes beyond is
     answered with 429, and when to come again."""
 
-    max_pending_bytes: PositiveInt = 256 * MEBIBYTE
-    """Request bodies held at once, in bytes; what comes beyond is answered with 429."""
+    max_pending_bytes: PositiveInt | None = None
+    """Request bodies held at once, in bytes, but for a single one that is larger; what comes beyond
+    is answered with 429. By default as for MESH_CACHE_BYTES."""
 
     deadline_seconds: PositiveFloat = 30.0
     """Longest work on one request, in seconds, not counting its wait for a worker; a mesh that
