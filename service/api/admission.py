@@ -17,10 +17,10 @@ from service.api.workers import Workers
 PROMPT_S = 1.0
 """Seconds within which a body comes on an ordinary network."""
 
-REFUSALS = 20
+REFUSALS = 40
 """Requests a second that are told at once that there is no room."""
 
-LONGEST_HOLD_S = 2.0
+LONGEST_HOLD_S = 1.5
 """How long those beyond are held before they are told, in seconds."""
 
 

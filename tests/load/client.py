@@ -13,6 +13,9 @@ from urllib.parse import urlencode
 
 BOUNDARY = "a-part-of-the-load"
 MULTIPART = f"multipart/form-data; boundary={BOUNDARY}"
+# Of what is read ahead: with less, a large answer wakes the client hundreds of times.
+LIMIT = 16 << 20
+
 # What the exporter of the meshes names itself by.
 GENERATOR = b"https://github.com/mikedh/trimesh"
 URLENCODED = "application/x-www-form-urlencoded"
@@ -102,7 +105,7 @@ class Client:
         if self._streams is not None and self._streams[0].at_eof():
             self.close()
         if self._streams is None:
-            self._streams = await asyncio.open_connection("127.0.0.1", self._port)
+            self._streams = await asyncio.open_connection("127.0.0.1", self._port, limit=LIMIT)
         return self._streams
 
 
