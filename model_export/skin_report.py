@@ -167,7 +167,7 @@ def bind_all(
     return {
         "skin": lambda *edit: turn(x, skin, *edit),
         "nearest": lambda *edit: turn(x, nearest, *edit),
-        "paper": lambda *edit: paper.carried(turn(surface, template.weights, *edit) - surface),
+        "paper": lambda *edit: x + paper.carried(turn(surface, template.weights, *edit) - surface),
     }
 
 

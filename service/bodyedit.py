@@ -58,8 +58,7 @@ def move(
             values = constrain(found, values, edits, constraints)
         after = standing(template, before, edited(before, values), keep)
         turn, scale = found.best.orientation, found.fit.normalization.scale
-        moved = binding.move(before, after) - found.vertices
-        linear = binding.linear(before, after)
+        moved, linear = binding.carry(before, after)
         rows = zip(NAMES, found.parameters.tolist(), values.tolist(), PARAMETER_UNITS, strict=True)
         statures = found.stature(before), found.stature(after)
         return Moved(

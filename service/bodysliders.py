@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from service.bodyconstraints import STATURE
 from service.bodyedit import ANGLES, standing
@@ -55,7 +56,7 @@ def template(found: BodyInference, options: SliderOptions, keep: str) -> bytes:
     body = found.model.template
     posed = body.decode(found.fit.body)
     shapedirs = body.shapedirs[:, :, :SHAPES]
-    binding = SkinBinding(body, posed, sparse_rows(body.weights), shapedirs)
+    binding = SkinBinding(body, posed, csr_array(sparse_rows(body.weights)), shapedirs)
     own = found.best.orientation.to_own(found.fit.normalization.invert(posed))
     own *= file_unit(found.mesh.format, found.unit)
     with stage("write"):
@@ -100,7 +101,7 @@ class _Rigged:
         vertices = self.binding.move(before, self.rest)
         if self.options.rest == "t_pose":
             turn = self.found.best.orientation
-            linear = turn.maps_to_own(self.binding.linear(before, self.rest))
+            linear = turn.maps_to_own(self.binding.carry(before, self.rest)[1])
             file = GlbFile(file.write(self._own(vertices)[self.of], linear[self.of]))
         offered = [self._slider(name) for name in self.names]
         asset = notes(self.found, self.keep, offered, self._further())

@@ -61,7 +61,8 @@ class Skeleton:
             body: the pose.
         """
         binds, nodes = joint_worlds(found, body), joint_nodes(found, body)
-        order = np.argsort(-binding.weights, axis=1, kind="stable")[:, : skinbinding.INFLUENCES]
+        weights = binding.weights
+        order = np.argsort(-weights, axis=1, kind="stable")[:, : skinbinding.INFLUENCES]
         return cls(
             names=JOINTS,
             parents=PARENTS,
@@ -71,7 +72,7 @@ class Skeleton:
             offsets=nodes[:, :3, 3],
             inverse_bind=np.asarray(np.linalg.inv(binds), dtype=np.float64),
             indices=order,
-            weights=np.take_along_axis(binding.weights, order, axis=1),
+            weights=np.take_along_axis(weights, order, axis=1),
         )
 
 

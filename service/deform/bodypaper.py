@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from service.deform.skinbinding import SkinBinding
+from service.deform.skinbinding import blended, bone_maps, relative_maps, with_identity
 from service.template.skinned import Body, SkinnedTemplate
 
 Array = NDArray[np.float64]
@@ -27,26 +27,27 @@ class PaperBinding:
 
     template: SkinnedTemplate
     vertices: Array
-    nearest: NDArray[np.int64]
+    nearest: NDArray[np.int32]
 
-    def move(self, before: Body, after: Body) -> Array:
-        """``[n, 3]`` vertices when the body they were bound to changes."""
-        return self.carried(self.template.decode(after) - self.template.decode(before))
+    def carry(self, before: Body, after: Body) -> tuple[Array, Array]:
+        """Where vertices go when the body they were bound to changes.
 
-    def linear(self, before: Body, after: Body) -> Array:
-        """``[n, 3, 3]`` how the body turns about each vertex, for normals and tangents: the mean
-        of the nearest template vertices' joints."""
-        weights = self.template.weights[self.nearest].mean(axis=1)
-        shapeless = np.zeros((*self.vertices.shape, 0))
-        return SkinBinding(self.template, self.vertices, weights, shapeless).linear(before, after)
+        Returns:
+            ``[n, 3]`` displacements, and ``[n, 3, 3]`` how the body turns about each vertex, for
+            normals and tangents: the mean of the nearest template vertices' joints.
+        """
+        moved = self.carried(self.template.decode(after) - self.template.decode(before))
+        changes = relative_maps(bone_maps(self.template, after), bone_maps(self.template, before))
+        influences = csr_array(self.template.weights[self.nearest].mean(axis=1))
+        return moved, with_identity(blended(influences, changes[:, :, :3]))
 
     def carried(self, displacement: Array) -> Array:
-        """``[n, 3]`` vertices when the template's have a ``displacement [V, 3]``."""
+        """``[n, 3]`` displacements when the template's are ``displacement [V, 3]``."""
         count, k = self.nearest.shape
         share = np.full(count * k, 1.0 / k)
         rows = np.arange(0, count * k + 1, k)
         mean = csr_array((share, self.nearest.ravel(), rows), shape=(count, len(displacement)))
-        moved: Array = self.vertices + mean @ displacement
+        moved: Array = mean @ displacement
         return moved
 
 
@@ -63,4 +64,4 @@ def bind(vertices: Array, template: SkinnedTemplate, body: Body, k: int = 32) ->
     x = np.asarray(vertices, np.float64)
     points = template.decode(body)
     nearest = cKDTree(points).query(x, k=range(1, min(k, len(points)) + 1))[1]
-    return PaperBinding(template, x, nearest.astype(np.int64))
+    return PaperBinding(template, x, nearest.astype(np.int32))

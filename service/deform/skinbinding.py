@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from service.deform.skinweights import skin_values
 from service.deform.weld import weld
@@ -30,18 +31,23 @@ class SkinBinding:
     Attributes:
         template: the body's.
         vertices: ``[n, 3]`` as bound, in the frame and unit of the body.
-        weights: ``[n, 24]`` skinning weights, at most `INFLUENCES` of a row not zero.
+        influences: ``[n, 24]`` skinning weights, at most `INFLUENCES` a row.
         shapedirs: ``[n, 3, S]`` displacement at rest, in metres, for each standard deviation of
             each shape coefficient.
     """
 
     template: SkinnedTemplate
     vertices: Array
-    weights: Array
+    influences: csr_array
     shapedirs: Array
 
-    def move(self, before: Body, after: Body) -> Array:
-        """``[n, 3]`` vertices when the body they were bound to changes.
+    @property
+    def weights(self) -> Array:
+        """``[n, 24]`` the same with all zeros."""
+        return np.asarray(self.influences.toarray())
+
+    def carry(self, before: Body, after: Body) -> tuple[Array, Array]:
+        """Where vertices go when the body they were bound to changes.
 
         Each joint's map from ``before`` to ``after`` is blended, not the maps from rest: no blend
         has to be inverted (of bodies with hands on hips, some have a determinant of 0.07), a
@@ -51,26 +57,22 @@ class SkinBinding:
         Args:
             before: the body that the mesh was bound to.
             after: what it becomes.
+
+        Returns:
+            ``[n, 3]`` displacements, and ``[n, 3, 3]`` local linear maps, for normals and tangents;
+            those of a change of shape, which hardly turns anything, are left out.
         """
-        maps, shifts = bone_maps(self.template, after)
-        changes = relative_maps((maps, shifts), bone_maps(self.template, before))
-        blended = (self.weights @ changes.reshape(len(JOINTS), 12)).reshape(-1, 3, 4)
-        moved = self.vertices + (
-            (blended[:, :, :3] @ self.vertices[:, :, None])[:, :, 0] + blended[:, :, 3]
-        )
+        now, was = bone_maps(self.template, after), bone_maps(self.template, before)
+        changes = blended(self.influences, relative_maps(now, was))
+        moved = applied(changes[:, :3], self.vertices) + changes[:, 3]
         change = np.asarray(after.shape - before.shape)
         if change.any():
-            linear = (self.weights @ maps.reshape(len(JOINTS), 9)).reshape(-1, 3, 3)
-            moved += (linear @ (self.shapedirs @ change)[:, :, None])[:, :, 0]
-        return moved
+            moved += applied(blended(self.influences, now[0]), self.shapedirs @ change)
+        return moved.T, with_identity(changes[:, :3])
 
-    def linear(self, before: Body, after: Body) -> Array:
-        """``[n, 3, 3]`` local linear maps of `move`, for normals and tangents; those of a change
-        of shape, which hardly turns anything, are left out."""
-        changes = relative_maps(bone_maps(self.template, after), bone_maps(self.template, before))
-        blended = self.weights @ changes[:, :, :3].reshape(len(JOINTS), 9)
-        maps: Array = blended.reshape(-1, 3, 3) + np.eye(3)
-        return maps
+    def move(self, before: Body, after: Body) -> Array:
+        """``[n, 3]`` vertices after a change; see `carry`."""
+        return self.vertices + self.carry(before, after)[0]
 
 
 def bind(
@@ -88,8 +90,28 @@ def bind(
     mesh = weld(x, np.asarray(faces, np.int64))
     values = skin_values(mesh, template, body)
     count = len(JOINTS)
-    weights = sparse_rows(values[:, :count])[mesh.of]
-    return SkinBinding(template, x, weights, values[:, count:][mesh.of].reshape(len(x), 3, -1))
+    influences = csr_array(sparse_rows(values[:, :count]))[mesh.of]
+    shapedirs = values[:, count:][mesh.of].reshape(len(x), 3, -1)
+    return SkinBinding(template, x, influences, shapedirs)
+
+
+def blended(influences: csr_array, maps: Array) -> Array:
+    """``[a, b, n]`` the joints' maps ``[24, a, b]``, mixed by ``influences [n, 24]``."""
+    rows = range(maps.shape[1])
+    return np.array([[influences @ column for column in maps[:, row].T] for row in rows])
+
+
+def with_identity(changes: Array) -> Array:
+    """``[n, 3, 3]`` linear maps from what they add to a point, ``[3, 3, n]``."""
+    maps: Array = (changes + np.eye(3)[:, :, None]).transpose(2, 0, 1)
+    return maps
+
+
+def applied(maps: Array, points: Array) -> Array:
+    """``[3, n]`` images of ``points [n, 3]`` by ``maps [3, 3, n]``; coordinate by coordinate,
+    several times faster than as products of small matrices."""
+    x, y, z = points.T
+    return np.array([row[0] * x + row[1] * y + row[2] * z for row in maps])
 
 
 def joint_matrices(template: SkinnedTemplate, body: Body) -> Array:

@@ -13,7 +13,8 @@ def test_the_nearest_alone_is_the_template_itself():
     vertices = template().decode(REST)
     binding = bodypaper.bind(vertices, template(), REST, k=1)
     np.testing.assert_array_equal(binding.nearest[:, 0], np.arange(len(vertices)))
-    np.testing.assert_allclose(binding.move(REST, AFTER), template().decode(AFTER), atol=1e-12)
+    moved = binding.carry(REST, AFTER)[0]
+    np.testing.assert_allclose(vertices + moved, template().decode(AFTER), atol=1e-12)
 
 
 def test_neighbours_count_alike():
@@ -23,4 +24,4 @@ def test_neighbours_count_alike():
     displacement = np.zeros_like(points)
     displacement[near] = [[0, 0, 4], [0, 4, 0], [4, 0, 0], [0, 0, 0]]
     moved = bodypaper.bind(x, template(), REST, k=4).carried(displacement)
-    np.testing.assert_allclose(moved - x, [[1.0, 1.0, 1.0]])
+    np.testing.assert_allclose(moved, [[1.0, 1.0, 1.0]])
