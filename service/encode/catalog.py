@@ -142,6 +142,12 @@ class Catalog:
             return digest, model
         except ShapeError:
             raise
+        except OSError as error:
+            raise ModelFault(
+                "model_unreadable",
+                f"a file of {card.name} can't be read: {error.strerror}",
+                "Let the service's user read all files of the model, and reload.",
+            ) from error
         except Exception as error:
             # Whatever a bad file sets off, the other models are served.
             logger.exception("%s can't be loaded", card)

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -64,3 +67,17 @@ def test_a_file_that_is_no_network_is_refused(tmp_path: Path, content: bytes | N
         EncoderSession(path)
     assert caught.value.code == "model_unreadable"
     assert "bad.onnx" in caught.value.detail
+
+
+PROGRAM = """
+from service.encode.model import SHIPPED, load_models
+load_models(SHIPPED, names=["debug"])["debug"].verify()
+"""
+
+
+def test_onnxruntime_reports_to_nobody(tmp_path: Path) -> None:
+    environment = {**os.environ, "HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
+    environment.pop("ORT_DISABLE_TELEMETRY", None)
+    subprocess.run([sys.executable, "-c", PROGRAM], env=environment, check=True, timeout=120)
+    # It would gather what it sends in the user's cache.
+    assert list(tmp_path.rglob("*onnxruntime*")) == []
