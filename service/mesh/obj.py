@@ -15,7 +15,7 @@ from service.mesh.faults import face_out_of_range, malformed, unsupported
 from service.mesh.meshfile import Linear, MeshFile, Vertices
 from service.mesh.polygons import fan
 from service.mesh.replacement import rewrite
-from service.mesh.textlines import TextLines
+from service.mesh.textlines import TextLines, holds
 from service.mesh.triples import Triples
 
 
@@ -86,7 +86,7 @@ class ObjFile(MeshFile):
 
 def _refuse_free_form(lines: TextLines) -> None:
     for keyword in (b"surf", b"curv", b"curv2"):
-        if keyword in lines.data and len(lines.beginning(keyword)[0]):
+        if holds(lines.data, keyword) and len(lines.beginning(keyword)[0]):
             raise unsupported(
                 "free_form",
                 f"The file has free-form curves or surfaces ({keyword.decode()})",

@@ -22,6 +22,8 @@ NEWLINE, RETURN, HASH, BACKSLASH = b"\n\r#\\"
 SPACE = ord(" ")
 # Indentation is stripped a column at a time up to here, then a line at a time.
 COLUMNS = 64
+# Bytes are searched by so many: one search of all would keep other threads waiting.
+BLOCK = 1 << 20
 TOKEN = re.compile(rb"[^\x00- ]+")
 
 
@@ -38,15 +40,19 @@ class TextLines:
     def __init__(self, format: str, data: bytes, continued: bool = False) -> None:
         """Find the lines; with `continued`, a backslash before a newline joins two lines."""
         self.format = format
-        limits.check_lines(data.count(b"\n"))
+        limits.check_lines(occurrences(data, b"\n"))
         self.data = data
         text = data
-        if continued and (b"\\\n" in text or b"\\\r\n" in text):
+        if continued and (holds(text, b"\\\n") or holds(text, b"\\\r\n")):
             text = joined(text)
         if b"\r" in text:
             text = text.replace(b"\r", b" " if b"\n" in text else b"\n")
-        # As long as the file, plus room to compare a keyword at the last line.
-        self.bytes: Bytes = np.frombuffer(text + b"\n" * 16, np.uint8)
+        # As long as the file, plus room to compare a keyword at the last line. Copied by numpy,
+        # which lets other threads run meanwhile.
+        self.bytes: Bytes = np.empty(len(text) + 16, np.uint8)
+        self.bytes[: len(text)] = np.frombuffer(text, np.uint8)
+        self.bytes[len(text) :] = NEWLINE
+        self.bytes.flags.writeable = False
         newlines = np.flatnonzero(self.bytes[: len(data)] == NEWLINE)
         self.ends: Indices = np.append(newlines, len(data))
         self.starts: Indices = self._indented(np.append(0, newlines + 1))
@@ -120,6 +126,17 @@ class TextLines:
         if HASH in gathered:
             gathered = without_comments(gathered)
         return Tokens(self.format, gathered, begins, starts)
+
+
+def occurrences(data: bytes, letter: bytes) -> int:
+    """How often a single character is in it."""
+    return sum(data.count(letter, at, at + BLOCK) for at in range(0, len(data), BLOCK))
+
+
+def holds(data: bytes, token: bytes) -> bool:
+    """Whether the token is in it."""
+    more = BLOCK + len(token) - 1
+    return any(data.find(token, at, at + more) >= 0 for at in range(0, len(data), BLOCK))
 
 
 def joined(data: bytes) -> bytes:

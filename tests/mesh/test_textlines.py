@@ -10,10 +10,13 @@ from hypothesis import strategies as st
 from service.errors import InvalidMesh, TooLarge
 from service.mesh import limits
 from service.mesh.textlines import (
+    BLOCK,
     COLUMNS,
     TextLines,
+    holds,
     joined,
     numbers,
+    occurrences,
     token_edges,
     without_comments,
 )
@@ -138,3 +141,12 @@ def test_lines_and_tokens_without_end_are_refused(monkeypatch: pytest.MonkeyPatc
     assert len(token_edges(np.frombuffer(b" 1 2 3", np.uint8))) == 6
     with pytest.raises(TooLarge, match="too_many_tokens"):
         token_edges(np.frombuffer(b"1 2 3 4", np.uint8))
+
+
+@pytest.mark.parametrize("at", [0, 5, BLOCK - 2, BLOCK - 1, BLOCK, 2 * BLOCK - 1, 2 * BLOCK + 7])
+def test_what_is_searched_by_blocks_is_found_wherever_it_is(at: int) -> None:
+    data = bytearray(b" " * (2 * BLOCK + 10))
+    assert not holds(bytes(data), b"ab\n")
+    data[at : at + 3] = b"ab\n"
+    assert holds(bytes(data), b"ab\n")
+    assert occurrences(bytes(data), b"b") == 1
