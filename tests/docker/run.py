@@ -110,7 +110,7 @@ def start(engine: Engine, image: str, port: int) -> None:
     engine("rm", "--force", NAME, check=False)
     engine(
         *("run", "--detach", "--name", NAME, "--network", "host", "--no-healthcheck"),
-        *("--read-only", "--tmpfs", "/tmp:size=160m", "--cap-drop", "ALL"),
+        *("--read-only", "--tmpfs", "/tmp:size=64m", "--cap-drop", "ALL"),
         *("--security-opt", "no-new-privileges", "--pids-limit", "64"),
         *("--cpus", "1", "--memory", str(MEMORY), image),
         *("--host", "127.0.0.1", "--port", str(port)),
