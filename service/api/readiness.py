@@ -82,7 +82,7 @@ class Readiness:
             # Not by a worker: a reload neither waits for requests nor holds them up.
             installed = await to_thread.run_sync(self._load)
         for fault in installed.faults:
-            logger.error("not served: %s", fault)
+            logger.error("model fault: %s", fault)
         if not installed.models:
             raise _nothing_to_serve(installed)
         models = [model for several in installed.versions.values() for model in several]
