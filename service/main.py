@@ -31,6 +31,7 @@ from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.cors import Cors
 from service.api.failures import Failures
+from service.api.framing import Framing
 from service.api.hangup import can_listen, reload_on_hangup
 from service.api.head import Head
 from service.api.keys import Keys
@@ -86,6 +87,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Admit, admission=app.state.context.admission)
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes, seconds=settings.body_seconds)
     app.add_middleware(Auth, keys=keys)
+    app.add_middleware(Framing)
     app.add_middleware(Head)
     app.add_middleware(Failures)
     if settings.cors_origins:
