@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import asyncio
+import os
+import sys
 import threading
 import time
 from collections.abc import Awaitable, Callable
@@ -13,7 +16,7 @@ from starlette.types import Message
 
 from service import deadline, stages
 from service.api.left import ClientLeft
-from service.api.workers import Workers
+from service.api.workers import NICENESS, Workers
 from service.errors import Overloaded
 
 
@@ -192,7 +195,6 @@ def test_work_whose_request_the_server_cancels_ends_too() -> None:
             ended.set()
 
     async def cancel() -> None:
-        import asyncio
 
         workers = Workers(1)
         task = asyncio.create_task(workers.run(Caller().request, work))
@@ -239,3 +241,17 @@ def test_the_pace_is_that_of_requests() -> None:
         return workers.pace
 
     assert anyio.run(work) >= 0.02
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="threads have priorities on Linux alone")
+def test_threads_that_work_stand_back_behind_the_event_loop() -> None:
+    def niceness() -> int:
+        return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+
+    async def twice() -> list[int]:
+        workers = Workers(1)
+        return [await workers.run(Caller().request, niceness) for _ in range(2)]
+
+    own = niceness()
+    assert anyio.run(twice) == [min(own + NICENESS, 19)] * 2
+    assert niceness() == own

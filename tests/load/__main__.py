@@ -172,6 +172,7 @@ def main() -> None:
         calls = asyncio.run(prepared(service.port, meshes, options.routes))
         print(HEAD, flush=True)
         alone = None
+        took, since = time.process_time(), time.perf_counter()
         for clients in map(int, options.clients.split(",")):
             tally = asyncio.run(run(service.port, calls, clients, *how))
             print(row(clients, tally), flush=True)
@@ -179,7 +180,9 @@ def main() -> None:
             for failure in tally.failed[:3]:
                 print(f"  {failure}")
         ratio = percentile(tally.accepted, 0.99) / percentile(alone.accepted, 0.99)
+        share = (time.process_time() - took) / (time.perf_counter() - since)
         print(f"\np99 of the last over that of the first: {ratio:.1f}; RSS {service.rss:.0f} MiB")
+        print(f"The clients took {100 * share:.0f} % of one CPU.")
 
 
 if __name__ == "__main__":
