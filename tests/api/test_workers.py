@@ -195,7 +195,6 @@ def test_work_whose_request_the_server_cancels_ends_too() -> None:
             ended.set()
 
     async def cancel() -> None:
-
         workers = Workers(1)
         task = asyncio.create_task(workers.run(Caller().request, work))
         await until(entered.is_set)
