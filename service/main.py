@@ -30,6 +30,7 @@ from service.api.auth import Auth
 from service.api.body_limit import BodyLimit
 from service.api.context import Context
 from service.api.cors import Cors
+from service.api.cross_site import CrossSite
 from service.api.failures import Failures
 from service.api.framing import Framing
 from service.api.hangup import can_listen, reload_on_hangup
@@ -50,6 +51,7 @@ from service.encode.catalog import Catalog
 from service.encode.installed import Installed
 from service.encode.model import SHIPPED, load_models
 from service.inferences import Inferences
+from service.origins import ALL
 from service.settings import MEBIBYTE, Settings
 from service.store.meshstore import MeshStore, open_store
 
@@ -88,6 +90,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(BodyLimit, limit=settings.max_upload_bytes, seconds=settings.body_seconds)
     app.add_middleware(Auth, keys=keys)
     app.add_middleware(Framing)
+    if ALL not in settings.cors_origins:
+        app.add_middleware(CrossSite, origins=settings.cors_origins)
     app.add_middleware(Head)
     app.add_middleware(Failures)
     if settings.cors_origins:
@@ -99,7 +103,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Pieces)
     app.add_middleware(Linger)  # added last: outermost
     problems.install(app)
-    for noun in (infer, edit, sliders, categories, meshes):
+    for noun in (infer, edit, sliders):
+        app.include_router(noun.router, responses=problems.documented(401, 403))
+    for noun in (categories, meshes):
         app.include_router(noun.router, responses=problems.documented(401))
     for noun in (probes, scrape, viewer):
         app.include_router(noun.router)

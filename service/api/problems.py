@@ -59,6 +59,7 @@ _PLAIN: dict[int, tuple[str, str]] = {
 _WHAT: dict[int, str] = {
     400: "The body is not well-formed multipart.",
     401: "The service wants an API key, and this is none that it knows.",
+    403: "A browser says that a page of another origin sends this, and none is let in.",
     404: "There is no such category, mesh or path.",
     408: "The body came too slowly.",
     413: "The upload is over a limit.",

@@ -70,3 +70,19 @@ def test_another_page_reads_nothing(page: Page, make: Callable[..., str], origin
     service = make(cors_origins=origins)
     for headers in ({}, {"Authorization": f"Bearer {KEY}"}):
         assert "refused" in call(page, service, **headers)
+
+
+def test_another_page_has_nothing_done(page: Page, serve: Callable[..., httpx.Client]) -> None:
+    """Without a key, by a form that no preflight goes before."""
+    client = serve(create_app(Settings(workers=1, categories="debug")))
+    blind = """async (url) => {
+      const form = new FormData();
+      form.append("mesh", new File(["v 0 0 0"], "a.obj"));
+      // What comes is kept from the page either way.
+      const sent = fetch(`${url}/infer`, { method: "POST", mode: "no-cors", body: form });
+      await sent.catch(() => null);
+    }"""
+    page.evaluate(blind, str(client.base_url))
+    metrics = client.get("/metrics").text
+    assert 'code="cross_site"' in metrics
+    assert "422" not in metrics

@@ -41,7 +41,7 @@ function titleOf(problem) {
   if (code === "constraints_conflict") return "These can't all be had";
   const titles = {
     401: "The service wants an API key", 413: "The file is too large", 415: "This file can't be read", 422: "This can't be done",
-    503: "The service is busy",
+    429: "The service is busy", 503: "The service is busy",
   };
   return titles[problem.status] ?? document.title ?? "Something went wrong";
 }
