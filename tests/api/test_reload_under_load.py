@@ -125,15 +125,18 @@ def test_no_request_fails_and_every_answer_is_of_one_version(
             version = list(versions)[(swap + 1) % 2]
             point(tmp_path / "models" / "current", versions[version])
             process.send_signal(signal.SIGHUP)
-            until = time.monotonic() + 30
+            until = time.monotonic() + 60
             while client.get("/readyz").json()["models"]["debug"]["version"] != version:
                 assert time.monotonic() < until, "the models were not reloaded"
+                time.sleep(0.01)
+            answered = len(seen)
+            while len(seen) < answered + 2 * CLIENTS:
+                assert time.monotonic() < until, "nothing is answered any more"
                 time.sleep(0.01)
     finally:
         stop.set()
         for thread in clients:
             thread.join()
-    assert len(seen) > 2 * SWAPS, "requests run beside each reload"
     assert [answer for answer in seen if "failed" in answer] == []
     digests = {v: file_digest(folder / "debug.onnx") for v, folder in versions.items()}
     assert {answer["model"]["version"] for answer in seen} == set(versions)
