@@ -71,6 +71,21 @@ _WHAT: dict[int, str] = {
     503: "The models are still loading, one of them can't be trusted, or the service is too busy.",
 }
 
+_HEADERS: dict[int, dict[str, Any]] = {
+    401: {
+        "WWW-Authenticate": {
+            "description": "`Bearer`: how a key is sent.",
+            "schema": {"type": "string"},
+        }
+    },
+    429: {
+        "Retry-After": {
+            "description": "Seconds until there is likely to be room.",
+            "schema": {"type": "integer", "minimum": 1},
+        }
+    },
+}
+
 
 class Problem(JSONResponse):
     """A problem document; `title` is the status's phrase, as goes with `about:blank`.
@@ -174,7 +189,11 @@ def install(app: FastAPI) -> None:
 def documented(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """OpenAPI entries for the problems that a route can answer with."""
     schema = {"$ref": "#/components/schemas/ProblemDocument"}
-    return {
+    entries: dict[int | str, dict[str, Any]] = {
         status: {"description": _WHAT[status], "content": {MEDIA_TYPE: {"schema": schema}}}
         for status in statuses
     }
+    for status, headers in _HEADERS.items():
+        if status in entries:
+            entries[status]["headers"] = headers
+    return entries
