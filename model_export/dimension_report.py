@@ -72,9 +72,9 @@ class Result:
 def judge(found: AffineInference) -> Iterator[Result]:
     """Ask for each derived dimension of an upload and measure what comes of it."""
     fit = found.fit
-    bound, by_mesh = found.bound("blend"), found.dimensions("blend")
+    bound = found.bound("blend")
     shape = fit.template, found.parameters, found.vertices, found.scale
-    by_fit = Dimensions(*shape, bound.columns)
+    by_fit, by_mesh = Dimensions(*shape, bound.columns), found.dimensions(bound)
     told = found.dimensions().derived(found.parameters)
     for (name, value), factor, (way, (measures, ask)) in product(
         told.items(), FACTORS, WAYS.items()

@@ -46,13 +46,32 @@ def move(
     Raises:
         InvalidRequest: for an edit that can't be made, or constraints that conflict.
     """
-    bound, dimensions = found.bound(options.mode), found.dimensions(options.mode)
+    bound = found.bound(options.mode)
     with stage("transfer"):
         try:
-            outcome = dimensions.outcome(edits, options.strict, constraints)
+            bound, dimensions, outcome = _settled(found, bound, edits, options, constraints)
         except Unsatisfiable as conflict:
             raise conflict_error(conflict, lambda _: found.unit) from conflict
         return _moved(found, bound, dimensions, outcome, keep)
+
+
+def _settled(
+    found: AffineInference,
+    bound: Bound,
+    edits: Mapping[str, Change],
+    options: EditOptions,
+    constraints: Mapping[str, Interval],
+) -> tuple[Bound, Dimensions, Outcome]:
+    """What an edit comes to, and the mesh with fewer folds for what that changes."""
+    dimensions = found.dimensions(bound)
+    outcome = dimensions.outcome(edits, constraints=constraints)
+    better = bound
+    if options.mode == "blend":
+        better = found.unfolded(np.flatnonzero(outcome.change).tolist())
+    if better is bound and not options.strict:
+        return bound, dimensions, outcome
+    dimensions = found.dimensions(better)
+    return better, dimensions, dimensions.outcome(edits, options.strict, constraints)
 
 
 def _moved(
@@ -75,7 +94,7 @@ def _moved(
         ],
         found.mesh.vertices + shift,
         turn.maps_to_own(linear),
-        len(found.turning.flipped(moved, linear)),
+        found.flips(bound, moved, linear),
         [*_warnings(found, outcome), *_measures(found, dimensions, outcome)],
     )
 

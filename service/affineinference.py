@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.deform import blend, paper
-from service.deform.bound import Bound
+from service.deform.bound import Bound, Columns
 from service.deform.dimensions import Dimensions
 from service.deform.followers import following
 from service.deform.measured import Level, find_levels
-from service.deform.unfold import unfold
+from service.deform.unfold import Unfolding
 from service.encode.affinemodel import AffineModel
 from service.encode.estimate import Estimate
 from service.inference import Inference
@@ -52,9 +52,9 @@ class AffineInference(Inference):
     def levels(self) -> Mapping[str, Level]:
         """Where derived dimensions are measured on the mesh itself."""
         fit = self.fit
-        return find_levels(
-            self.vertices, self.mesh.faces, fit.template, fit.parameters, fit.translation
-        )
+        at = fit.template, fit.parameters, fit.translation
+        with stage("bind"):
+            return find_levels(self.vertices, self.mesh.faces, *at)
 
     def bound(self, mode: str) -> Bound:
         """The mesh, bound to its fitted template by the rule of a mode, for edits of all that users
@@ -62,33 +62,51 @@ class AffineInference(Inference):
         return self.memo.get(("bound", mode), partial(self._bound, mode))
 
     def _bound(self, mode: str) -> Bound:
-        fit, faces, rule = self.fit, self.mesh.faces, blend.bind if mode == "blend" else paper.bind
+        fit, rule = self.fit, blend.bind if mode == "blend" else paper.bind
         with stage("bind"):
             template = following(fit.template, fit.parameters)
-            binding = rule(self.vertices, faces, template, fit.parameters, fit.translation)
-            if mode == "blend":
-                binding = unfold(binding, self.vertices, faces, fit.parameters, self._changing)
-            return binding.bound(self._changing)
+            at = fit.parameters, fit.translation
+            binding = rule(self.vertices, self.mesh.faces, template, *at)
+            by = [index for dimension in template.derived.values() for index in dimension.by]
+            return binding.bound(sorted({*np.flatnonzero(template.public).tolist(), *by}))
+
+    def unfolded(self, changed: Iterable[int]) -> Bound:
+        """The mesh, bound by the rule of ``blend``, with fewer folds for the changed parameters."""
+        bound, evened = self.bound("blend"), dict[tuple[int, int], NDArray[np.floating]]()
+        for index in changed:
+            evened |= self.memo.get(("unfolded", index), partial(self._unfolded, index))
+        # Most meshes fold nowhere.
+        return replace(bound, columns={**bound.columns, **evened}) if evened else bound
+
+    def _unfolded(self, index: int) -> Columns:
+        bound, unfolding = self.bound("blend"), self._unfolding
+        with stage("bind"):
+            return unfolding.evened(bound, index, float(self.fit.parameters[index]))
 
     @property
-    def _changing(self) -> list[int]:
-        """Indices of the parameters that an edit may change."""
-        template = self.fit.template
-        by = [index for dimension in template.derived.values() for index in dimension.by]
-        return sorted({*np.flatnonzero(template.public).tolist(), *by})
+    def _unfolding(self) -> Unfolding:
+        return self.memo.get("unfolding", self._make_unfolding)
 
-    def dimensions(self, mode: str | None = None) -> Dimensions:
-        """The mesh's dimensions in the reported unit: as the fit has them; or, once the mesh is
-        bound by the rule of a mode, as it has them itself and as they can be changed."""
-        return self.memo.get(("dimensions", mode), partial(self._dimensions, mode))
-
-    def _dimensions(self, mode: str | None) -> Dimensions:
-        template, parameters, scale = self.fit.template, self.parameters, self.scale
-        if mode is None:
-            return Dimensions(template, parameters, self.vertices, scale)
-        columns = self.bound(mode).columns
+    def _make_unfolding(self) -> Unfolding:
+        welded = self.bound("blend").welded
+        assert welded is not None
         with stage("bind"):
-            return Dimensions(template, parameters, self.vertices, scale, columns, self.levels)
+            return Unfolding(welded)
+
+    def flips(self, bound: Bound, moved: NDArray[np.floating], maps: NDArray[np.floating]) -> int:
+        """How many faces displacements ``[V, 3]`` with linear maps ``[V, 3, 3]`` turn inside
+        out."""
+        if bound.welded is None:
+            return len(self.turning.flipped(moved, maps))
+        return self._unfolding.flips(moved, maps)
+
+    def dimensions(self, bound: Bound | None = None) -> Dimensions:
+        """The mesh's dimensions in the reported unit: as the fit has them; or, once it is bound, as
+        it has them itself and as they can be changed."""
+        shape = self.fit.template, self.parameters, self.vertices, self.scale
+        if bound is None:
+            return Dimensions(*shape)
+        return Dimensions(*shape, bound.columns, self.levels)
 
     def parameter_report(self) -> dict[str, dict[str, Any]]:
         template = self.model.template

@@ -43,7 +43,8 @@ def sliders(found: AffineInference, options: SliderOptions, keep: str) -> bytes:
         InvalidRequest: for an unknown parameter.
     """
     names = _chosen(found, options)
-    bound, measured = found.bound("blend"), _measured(found)
+    bound = found.unfolded(found.model.template.names.index(name) for name in names)
+    measured = _measured(found, bound)
     with stage("write"):
         shown = as_glb(found.mesh, file_unit(found.mesh.format, found.unit))
         return _with_targets(found, shown, bound, names, options, keep, measured)
@@ -149,10 +150,10 @@ def _largest(shift: Array) -> Array:
     return np.maximum(np.maximum(x, y), z)
 
 
-def _measured(found: AffineInference) -> dict[str, Plane]:
+def _measured(found: AffineInference, bound: Bound) -> dict[str, Plane]:
     """Derived dimensions that edits take from the mesh itself, affine in the parameters."""
     f, rows = found.parameters, {}
-    for name, reading in found.dimensions("blend").readings.items():
+    for name, reading in found.dimensions(bound).readings.items():
         if reading.corrects:
             value, row = reading.gauge.tangent(np.zeros_like(f))
             rows[name] = (value - float(row @ f), row)

@@ -51,7 +51,7 @@ class Binding:
         """What is to be kept of it for changes of the parameters with these indices."""
         gradients = {index: self.gradient(index, slice(None)) for index in parameters}
         columns = columns_of(self.jacobian, parameters)
-        return Bound(len(self.jacobian), columns, gradients)
+        return Bound(len(self.jacobian), columns, gradients, self.welded)
 
     def gradient(self, index: int, rows: NDArray[np.int64] | slice) -> Gradient:
         """What a unit of one parameter adds to the linear maps of some vertices."""

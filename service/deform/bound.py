@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from service.deform.gradient import Gradient
+from service.deform.weld import Welded
 
 Array32 = NDArray[np.float32]
 
@@ -27,11 +28,13 @@ class Bound:
         count: of the mesh's vertices.
         columns: their displacements per unit of each parameter.
         gradients: what a unit of each parameter adds to their local linear maps.
+        welded: the mesh without its seams, where that is known.
     """
 
     count: int
     columns: Columns
     gradients: Mapping[int, Gradient]
+    welded: Welded | None = None
 
     def displace(self, df: ArrayLike) -> Array32:
         """Displacements ``[V, 3]`` for a change of the parameters ``df [d]``.

@@ -28,7 +28,7 @@ class Gradient:
     cells: Sequence[tuple[int, int]]
     values: Array32
 
-    def of(self, rows: Index) -> Gradient:
+    def of(self, rows: Index | slice) -> Gradient:
         """The same of some vertices."""
         return Gradient(self.cells, self.values[:, rows])
 

@@ -8,8 +8,8 @@ binding linear, and is kept itself only as far as fewer faces fold.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,11 +18,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from service import deadline
-from service.deform.binding import Binding
+from service.deform.bound import Bound, Columns
 from service.deform.gradient import Gradient
 from service.deform.patch import Patch, Patches
 from service.deform.turning import Turning
-from service.deform.weld import weld
+from service.deform.weld import Welded
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -42,44 +42,49 @@ FARTHEST = 0.03
 """Normalised length by which a repair may move a vertex along an axis in a strong edit."""
 
 
-def unfold(
-    binding: Binding, vertices: Array, faces: Index, f: Array, parameters: Sequence[int]
-) -> Binding:
-    """The binding with fewer folds.
+class Unfolding:
+    """A bound mesh without its seams, where folds can be looked for and evened out."""
 
-    Args:
-        binding: of the mesh.
-        vertices: ``[V, 3]`` of the mesh, in the frame that it was bound in.
-        faces: ``[F, 3]``.
-        f: ``[d]`` parameters that it was bound at.
-        parameters: indices of those to look after.
-    """
-    jacobian = binding.jacobian
-    welded = binding.welded or weld(vertices, faces)
-    turning, patches = Turning(welded.vertices, welded.faces), Patches(welded)
-    shares = [k - 1.0 for k in STRONG]
-    for index in parameters:
-        deadline.check()
-        steps = [share * float(f[index]) for share in shares]
-        motion = {axis: jacobian[welded.rows, axis, index] for axis in range(3)}
-        motion = {axis: column for axis, column in motion.items() if column.any()}
+    def __init__(self, welded: Welded) -> None:
+        self.turning = Turning(welded.vertices, welded.faces)
+        self._welded = welded
+        self._patches = Patches(welded)
+
+    def flips(self, moved: NDArray[np.floating], maps: NDArray[np.floating]) -> int:
+        """How many faces turn inside out as the mesh's vertices move by ``moved [V, 3]`` and turn
+        by ``maps [V, 3, 3]``."""
+        rows = self._welded.rows
+        return len(self.turning.flipped(moved[rows], maps[rows]))
+
+    def evened(self, bound: Bound, index: int, parameter: float) -> Columns:
+        """The columns of one parameter with fewer folds; none where there are none to begin with.
+
+        Args:
+            bound: the mesh.
+            index: of the parameter.
+            parameter: what the mesh was bound at.
+        """
+        welded = self._welded
+        steps = [(factor - 1.0) * parameter for factor in STRONG]
+        columns = {axis: c for (axis, other), c in bound.columns.items() if other == index}
+        motion = {axis: column[welded.rows] for axis, column in columns.items()}
         if not motion:
-            continue
-        gradient = binding.gradient(index, welded.rows)
-        wild = gradient.wild(float(f[index]), shares)
-        folded = turning.folded(motion, gradient, wild, steps)
+            return {}
+        gradient = bound.gradients[index].of(welded.rows)
+        wild = gradient.wild(parameter, [factor - 1.0 for factor in STRONG])
+        folded = self.turning.folded(motion, gradient, wild, steps)
         if not folded.any():
-            continue
-        patch = patches.around(np.asarray(folded.any(axis=0)))
+            return {}
+        patch = self._patches.around(np.asarray(folded.any(axis=0)))
         folds = _Folds(patch, tuple(motion), gradient.of(patch.vertex), wild[patch.vertex], steps)
         column = np.stack([values[patch.vertex] for values in motion.values()])
-        jacobian = jacobian.copy(order="K") if jacobian is binding.jacobian else jacobian
         repaired = _repaired(folds, column.astype(np.float64))
+        evened = {}
         for (axis, values), better in zip(motion.items(), repaired, strict=True):
             whole = values.copy()
             whole[patch.vertex] = better
-            jacobian[:, axis, index] = whole[welded.of]
-    return replace(binding, jacobian=jacobian)
+            evened[axis, index] = whole if welded.seamless else whole[welded.of]
+        return evened
 
 
 @dataclass(frozen=True)
