@@ -10,6 +10,7 @@ import h11
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from service.api.body_limit import RATE
 from service.api.problems import Problem
 from service.api.routes import PROBES
 from service.api.safety import protect
@@ -40,8 +41,8 @@ class Connection(H11Protocol):
         super().__init__(*arguments, **named)
         self._head_since: float | None = None
         self._stuck_since: float | None = None
-        self._blocked_since: float | None = None
-        self._closing_since: float | None = None
+        self._unread_since: float | None = None
+        self._unread = 0
         self._refused = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -62,32 +63,35 @@ class Connection(H11Protocol):
         if self.conn.their_state is not h11.IDLE:
             self._head_since = None
 
-    def pause_writing(self) -> None:
-        self._blocked_since = self.loop.time()
-        super().pause_writing()
-
     def resume_writing(self) -> None:
-        self._blocked_since = None
+        self._unread_since = None
         super().resume_writing()
 
     def sweep(self) -> None:
         """Close the connection if its client has had its time; to be called now and then."""
         now, config = self.loop.time(), self.config
-        closing = self.transport.is_closing()
-        self._closing_since = (self._closing_since or now) if closing else None
+        self._look_at_reader(now)
         self._stuck_since = (self._stuck_since or now) if self._stuck() else None
-        if _over(self._closing_since, now, config.body_seconds) or _over(
-            self._blocked_since, now, config.body_seconds
-        ):
-            # What is still to be written finds no reader.
+        if _over(self._unread_since, now, config.body_seconds):
             self.transport.abort()
+        elif self.transport.is_closing():
+            return
         elif _over(self._stuck_since, now, LINGER_S):
             self.transport.close()
-        elif _over(self._head_since, now, config.header_seconds) and not closing:
+        elif _over(self._head_since, now, config.header_seconds):
             if self.conn.trailing_data[0]:
                 self._refuse(408, "head_too_slow", "The request's head did not come in time.")
             else:
                 self.transport.close()
+
+    def _look_at_reader(self, now: float) -> None:
+        """Note since when the client has taken next to nothing of what is written for it."""
+        unread = self.transport.get_write_buffer_size()
+        enough = RATE * self.config.body_seconds
+        if unread == 0:
+            self._unread_since = None
+        elif self._unread_since is None or self._unread - unread >= enough:
+            self._unread_since, self._unread = now, unread
 
     def _stuck(self) -> bool:
         """Whether the client may go on sending what nobody wants, after its answer."""
