@@ -17,6 +17,9 @@ from service.api.workers import Workers
 PROMPT_S = 1.0
 """Seconds within which a body comes on an ordinary network."""
 
+SMALL = 64 * 1024
+"""Bytes of a body that come in however many are held: as many as come with a `mesh_id`."""
+
 REFUSALS = 40
 """Requests a second that are told at once that there is no room."""
 
@@ -110,7 +113,7 @@ class Admission:
         request = Request(declared)
         self._inside.add(request)
         try:
-            self._check_bytes()
+            self._check_bytes(request)
         except HTTPException:
             self._inside.remove(request)
             raise
@@ -128,7 +131,7 @@ class Admission:
         """
         had_place = request.has_place
         request.received += count
-        self._check_bytes()
+        self._check_bytes(request)
         # What came slowly but whole is let into a longer queue before it is thrown away.
         if whole and not had_place and self.held >= 2 * self.places:
             raise self._full(
@@ -136,8 +139,9 @@ class Admission:
             )
         request.whole = whole
 
-    def _check_bytes(self) -> None:
-        if len(self._inside) > 1 and self.held_bytes > self.most_bytes:
+    def _check_bytes(self, request: Request) -> None:
+        alone = len(self._inside) == 1
+        if not alone and request.bytes > SMALL and self.held_bytes > self.most_bytes:
             raise self._full("bytes", f"Bodies of {self.most_bytes} bytes are held already.")
 
     def _full(self, reason: str, detail: str) -> HTTPException:

@@ -18,6 +18,7 @@ from service.api.context import Context
 from service.api.workers import Workers
 
 MESH = {"mesh": ("a.obj", b"v 0 0 0")}
+MIB = 1 << 20
 FORM = "multipart/form-data; boundary=x"
 PART = b'--x\r\nContent-Disposition: form-data; name="mesh"; filename="a.obj"\r\n\r\n'
 
@@ -69,30 +70,32 @@ def test_refusals_beyond_a_second_s_worth_are_held(monkeypatch: pytest.MonkeyPat
 
 
 def test_declared_bytes_are_held_up_front() -> None:
-    gate = Admission(Workers(9), 0, 100)
-    first = gate.enter(60)
-    refused(lambda: gate.enter(60))
-    assert gate.held_bytes == 60
+    gate = Admission(Workers(9), 0, 100 * MIB)
+    first = gate.enter(100 * MIB)
+    refused(lambda: gate.enter(MIB))
+    assert gate.held_bytes == 100 * MIB
+    # What names a mesh by its id is let in all the same.
+    gate.leave(gate.enter(1000))
     gate.leave(first)
     # One alone may be larger.
-    gate.enter(600)
+    gate.enter(600 * MIB)
 
 
 def test_bytes_that_were_not_declared_count_as_they_come() -> None:
-    gate = Admission(Workers(9), 0, 100)
+    gate = Admission(Workers(9), 0, 100 * MIB)
     first, second = gate.enter(0), gate.enter(0)
-    gate.receive(first, 60, whole=False)
-    gate.receive(second, 40, whole=False)
+    gate.receive(first, 60 * MIB, whole=False)
+    gate.receive(second, 40 * MIB, whole=False)
     refused(lambda: gate.receive(second, 1, whole=True))
     gate.leave(second)
-    gate.receive(first, 60, whole=True)
-    assert gate.held_bytes == 120
+    gate.receive(first, 60 * MIB, whole=True)
+    assert gate.held_bytes == 120 * MIB
 
 
 def test_a_slow_body_holds_what_has_come(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(admission, "PROMPT_S", 0.0)
-    gate = Admission(Workers(1), 0, 100)
-    slow = [gate.enter(90) for _ in range(5)]
+    gate = Admission(Workers(1), 0, 100 * MIB)
+    slow = [gate.enter(90 * MIB) for _ in range(5)]
     assert (gate.held, gate.held_bytes) == (0, 0)
     # What is whole takes a place; late ones have as many again.
     gate.receive(slow[0], 10, whole=True)
