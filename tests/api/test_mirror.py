@@ -124,6 +124,6 @@ def test_places_are_told(store: MeshStore) -> None:
     assert value(registry, "pending_bytes") == 600
     assert value(registry, "pending_limit_bytes") == 1000
     with pytest.raises(Exception, match="1000 bytes"):
-        context.admission.enter(500)
+        context.admission.enter(500_000)
     assert value(registry, "admission_rejections_total", reason="bytes") == 1
     assert value(registry, "admission_rejections_total", reason="places") == 0
