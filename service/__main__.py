@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from pydantic import ValidationError
 
-from service import logs
+from service import logs, malloc
 from service.api import tracing
 from service.api.keys import KeysFault
 from service.main import create_app
@@ -25,6 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     The exit status is 0 when all requests were answered before the end, else 1; 1 when the port
     can't be had, and 2 when a setting makes no sense.
     """
+    malloc.settle()
     parser = argparse.ArgumentParser(prog="python -m service", description=__doc__)
     parser.add_argument("--host", help="address to listen on (HOST, 127.0.0.1)")
     parser.add_argument("--port", help="port to listen on (PORT, 8000)")
