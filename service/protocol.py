@@ -98,6 +98,9 @@ class Connection(H11Protocol):
         answered = self.cycle is not None and self.cycle.response_complete
         return self._refused or (answered and self.conn.their_state is h11.SEND_BODY)
 
+    def _unsupported_upgrade_warning(self) -> None:
+        """Nothing to warn of: an upgrade is declined by answering as if none were asked for."""
+
     def send_400_response(self, msg: str) -> None:
         """Answer what can't be read as HTTP; called where the parser's error is handled."""
         error = sys.exc_info()[1]

@@ -223,3 +223,11 @@ def test_beyond_the_most_connections_probes_alone_are_answered(
                 assert reply(fourth).status == 200
         first.sendall(head("/", "GET"))
         assert reply(first).status == 200
+
+
+def test_an_upgrade_is_declined_without_a_word(caplog: pytest.LogCaptureFixture) -> None:
+    with running() as (port, _), connected(port) as connection:
+        for protocol_name in ("websocket", "h2c"):
+            connection.sendall(head("/", "GET", connection="Upgrade", upgrade=protocol_name))
+            assert reply(connection).status == 200
+    assert [entry for entry in caplog.records if entry.levelname == "WARNING"] == []
