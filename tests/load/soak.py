@@ -15,7 +15,7 @@ from .meshes import CATEGORIES, Mesh, generated, read
 from .service import Service, started
 
 EVERY = 500
-"""Requests between two looks at the memory."""
+"""Requests between two looks at the memory, with none in work."""
 
 # Caches that are full within the first requests: what grows later is none of theirs.
 BUDGETS = {"MESH_CACHE_BYTES": str(16 << 20), "INFERENCE_CACHE_BYTES": str(16 << 20)}
@@ -89,27 +89,28 @@ async def soak(service: Service, mix: Mix, random: Random, requests: int, client
     sent = 0
     start = time.monotonic()
 
-    def look() -> None:
+    async def look() -> None:
+        # Work for those who hung up ends within a moment.
+        await asyncio.sleep(1.0)
         memory[sent] = service.rss
         rate = sent / (time.monotonic() - start)
         print(f"| {sent} | {memory[sent]:.0f} | {rate:.1f} |", flush=True)
 
-    async def client() -> None:
+    async def client(until: int) -> None:
         nonlocal sent
         connection = Client(service.port)
-        while sent < requests:
+        while sent < until:
             sent += 1
-            number = sent
             try:
                 seen[await _one(connection, mix, random)] += 1
             except TRANSIENT as error:
                 seen[f"broken connection: {error!r}"] += 1
-            if number % EVERY == 0 or number == requests:
-                look()
         connection.close()
 
     print("| requests | RSS, MiB | requests/s |\n|---:|---:|---:|", flush=True)
-    await asyncio.gather(*(client() for _ in range(clients)))
+    for until in [*range(EVERY, requests, EVERY), requests]:
+        await asyncio.gather(*(client(until) for _ in range(clients)))
+        await look()
     print("\n" + ", ".join(f"{status}: {count}" for status, count in sorted(seen.items())))
     first, last = memory[min(memory)], memory[max(memory)]
     return last / first - 1
