@@ -19,6 +19,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
 from pathlib import Path
+from signal import SIGTERM
 
 import httpx
 import numpy as np
@@ -190,6 +191,24 @@ def check_memory(engine: Engine, table: Table, what: str, limit: int) -> None:
     table.row(f"memory {what}", text, most < limit)
 
 
+def caught(engine: Engine) -> int:
+    """The signals that the service handles, a bit each."""
+    status = engine.inside("cat", "/proc/1/status")
+    return int(re.findall(r"SigCgt:\s+(\w+)", status)[0], 16)
+
+
+def check_stop_at_start(engine: Engine, table: Table) -> None:
+    """SIGTERM while Python still imports, from when it would be heard at all."""
+    started = time.monotonic()
+    while not caught(engine) >> (SIGTERM - 1) & 1:
+        time.sleep(0.02)
+    engine("stop", "--time", str(STOP_S), NAME)
+    seconds = time.monotonic() - started
+    (facts,) = json.loads(engine("inspect", NAME))
+    code = facts["State"]["ExitCode"]
+    table.row("stopped while it starts", f"{seconds:.1f} s, status {code}", code == 0)
+
+
 def check_stop(engine: Engine, table: Table, client: httpx.Client) -> None:
     """SIGTERM while a request is in work: it is answered, and the container ends by itself."""
     sample = SAMPLES / "human.glb"
@@ -226,6 +245,8 @@ def main() -> int:
     if not given.no_build:
         build(engine, table, given.base, given.image)
     check_image(engine, table, given.image)
+    start(engine, given.image, given.port)
+    check_stop_at_start(engine, table)
     start(engine, given.image, given.port)
     client = httpx.Client(base_url=f"http://127.0.0.1:{given.port}", timeout=60, trust_env=False)
     try:

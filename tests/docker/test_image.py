@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterable
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
+from signal import SIGTERM
 from threading import Thread
 from types import TracebackType
 
@@ -200,3 +201,20 @@ def test_the_health_check_fails_where_nobody_answers() -> None:
     with Answering(200) as server:
         port = server.port
     assert health(port) == 1
+
+
+def test_a_container_that_is_stopped_while_it_starts_ends(tmp_path: Path) -> None:
+    package = tmp_path / "service"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "__main__.py").write_text(
+        "import sys, time\nprint(sys.argv[1:], flush=True)\ntime.sleep(60)\n"
+    )
+    command = [sys.executable, DOCKER / "start.py", "--port", "1"]
+    with subprocess.Popen(
+        command, env={"PYTHONPATH": str(tmp_path)}, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "['--port', '1']\n"
+        process.send_signal(SIGTERM)
+        assert process.wait(timeout=30) == 0
