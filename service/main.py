@@ -9,9 +9,11 @@ from importlib.metadata import version
 from itertools import chain
 
 import anyio
+import anyio.to_thread
 from fastapi import FastAPI
 from threadpoolctl import threadpool_limits
 
+from service import malloc
 from service.api import (
     categories,
     edit,
@@ -54,6 +56,8 @@ from service.inferences import Inferences
 from service.origins import ALL
 from service.settings import MEBIBYTE, Settings
 from service.store.meshstore import MeshStore, open_store
+
+TRIM_EVERY_S = 10.0
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -155,6 +159,17 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         tasks.start_soon(context.readiness.start)
         if can_listen():
             tasks.start_soon(reload_on_hangup, context.readiness, app.state.keys)
+        tasks.start_soon(_trim_after_work, context.workers)
         yield
         context.store.close()
         tasks.cancel_scope.cancel()
+
+
+async def _trim_after_work(workers: Workers) -> None:
+    """Now and then give the memory back that requests have left free, if there were any."""
+    seen = workers.pace
+    while True:
+        await anyio.sleep(TRIM_EVERY_S)
+        if workers.pace != seen:
+            seen = workers.pace
+            await anyio.to_thread.run_sync(malloc.trim)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Callable
 
 MEBIBYTE = 1024 * 1024
 
@@ -24,9 +25,20 @@ def settle() -> None:
 
     To be called before threads start; nothing happens where the C library is another.
     """
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if os.name == "posix" else None
+    mallopt = _function("mallopt")
     if mallopt is None:
         return
     for name, (parameter, value) in _PARAMETERS.items():
         if name not in os.environ:
             mallopt(parameter, value)
+
+
+def trim() -> None:
+    """Give back what lies free between what lives; takes some ms, and lets other threads run."""
+    release = _function("malloc_trim")
+    if release is not None:
+        release(0)
+
+
+def _function(name: str) -> Callable[..., int] | None:
+    return getattr(ctypes.CDLL(None), name, None) if os.name == "posix" else None

@@ -7,10 +7,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import anyio
 import httpx
 import pytest
 
 from service import __main__, main
+from service.api.workers import Workers
 from service.encode.model import SHIPPED
 from service.settings import Settings
 
@@ -126,3 +128,25 @@ def test_a_store_that_can_not_be_ends_the_command(
     monkeypatch.setenv(name, value)
     assert __main__.main([]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_memory_is_given_back_after_work_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    trims: list[int] = []
+    monkeypatch.setattr(main, "TRIM_EVERY_S", 0.005)
+    monkeypatch.setattr(main.malloc, "trim", lambda: trims.append(1))
+    workers = Workers(1)
+
+    async def work_once() -> None:
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(main._trim_after_work, workers)
+            await anyio.sleep(0.05)
+            assert trims == []
+            workers.pace = 0.5
+            with anyio.fail_after(20):
+                while not trims:
+                    await anyio.sleep(0.005)
+            await anyio.sleep(0.05)
+            tasks.cancel_scope.cancel()
+
+    anyio.run(work_once)
+    assert trims == [1]

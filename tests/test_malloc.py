@@ -39,3 +39,17 @@ def test_an_operator_who_knows_better_is_heeded(
 def test_another_library_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ctypes, "CDLL", lambda name: object())
     malloc.settle()
+
+
+def test_free_memory_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept: list[int] = []
+
+    class Library:
+        def malloc_trim(self, pad: int) -> None:
+            kept.append(pad)
+
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: Library())
+    malloc.trim()
+    assert kept == [0]
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: object())
+    malloc.trim()
