@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import gc
 import itertools
 import json
 import os
@@ -168,6 +169,8 @@ def main() -> None:
     sizes = ", ".join(f"{mesh.name} {len(mesh.data) / 1e6:.1f} MB" for mesh in meshes)
     cpus = len(os.sched_getaffinity(0))
     print(f"{options.routes}; {sizes}; {cpus} CPUs; {settings or 'defaults'}\n")
+    # The clients' own garbage collections would show as slow probes.
+    gc.freeze()
     with started(settings) as service:
         calls = asyncio.run(prepared(service.port, meshes, options.routes))
         print(HEAD, flush=True)
