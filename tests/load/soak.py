@@ -10,6 +10,8 @@ from collections import Counter
 from pathlib import Path
 from random import Random
 
+from service.main import TRIM_EVERY_S
+
 from .client import Answer, Call, Client, by_id, upload
 from .meshes import CATEGORIES, Mesh, generated, read
 from .service import Service, started
@@ -90,8 +92,8 @@ async def soak(service: Service, mix: Mix, random: Random, requests: int, client
     start = time.monotonic()
 
     async def look() -> None:
-        # Work for those who hung up ends within a moment.
-        await asyncio.sleep(1.0)
+        # Work for those who hung up ends, and the service gives back what requests left free.
+        await asyncio.sleep(TRIM_EVERY_S + 1.0)
         memory[sent] = service.rss
         rate = sent / (time.monotonic() - start)
         print(f"| {sent} | {memory[sent]:.0f} | {rate:.1f} |", flush=True)
