@@ -123,8 +123,8 @@ class Settings(BaseSettings):
     """Time for the head of a request to come whole, in seconds."""
 
     body_seconds: PositiveFloat = 20.0
-    """Time for each KiB a second of a body to come, in seconds: one that is slower is answered
-    with 408. And for a client to take a part of its answer, before the connection is cut."""
+    """How long a body may come at less than 1 KiB a second, in seconds, before it is answered with
+    408; and a client take its answer as slowly, before the connection is cut."""
 
     drain_seconds: NonNegativeFloat = 5.0
     """How long SIGTERM lets the service go on while `/readyz` says `draining`, in seconds, for load
