@@ -54,8 +54,9 @@ from service.encode.catalog import Catalog
 from service.encode.installed import Installed
 from service.encode.model import SHIPPED, load_models
 from service.inferences import Inferences
+from service.memory import Memory
 from service.origins import ALL
-from service.settings import MEBIBYTE, Settings
+from service.settings import Settings
 from service.store.meshstore import MeshStore, open_store
 
 TRIM_EVERY_S = 10.0
@@ -126,10 +127,17 @@ def _context(settings: Settings) -> Context:
     body = settings.body_model
     shipped = partial(load_models, SHIPPED, threads, body, settings.categories)
     catalog = Catalog(shipped, settings.models_dir, threads, body, settings.default_models)
-    pool = Workers(workers, settings.deadline_seconds)
+    memory = Memory(memory_bytes())
+    meshes_held = memory.share(settings.mesh_cache_bytes)
+    inferences_held = memory.share(settings.inference_cache_bytes)
+    bodies_held = memory.share(settings.max_pending_bytes)
+    vertices = settings.max_vertices or memory.vertices(
+        workers, meshes_held + inferences_held + bodies_held
+    )
+    pool = Workers(workers, settings.deadline_seconds, vertices)
     queue = max(1, workers // 2) if settings.queue is None else settings.queue
-    admission = Admission(pool, queue, _share_of_memory(settings.max_pending_bytes))
-    inferences = Inferences(_share_of_memory(settings.inference_cache_bytes))
+    admission = Admission(pool, queue, bodies_held)
+    inferences = Inferences(inferences_held)
 
     def load() -> Installed:
         installed = catalog.load()
@@ -138,7 +146,7 @@ def _context(settings: Settings) -> Context:
         return installed
 
     readiness = Readiness(load)
-    return Context(_store(settings), inferences, readiness, pool, admission, Metrics())
+    return Context(_store(settings, meshes_held), inferences, readiness, pool, admission, Metrics())
 
 
 def _freeze() -> None:
@@ -149,15 +157,9 @@ def _freeze() -> None:
     gc.freeze()
 
 
-def _share_of_memory(asked: int | None) -> int:
-    """Bytes of memory: as many as the operator says, else an eighth of all, or less."""
-    return min(256 * MEBIBYTE, memory_bytes() // 8) if asked is None else asked
-
-
-def _store(settings: Settings) -> MeshStore:
-    memory = _share_of_memory(settings.mesh_cache_bytes)
+def _store(settings: Settings, memory_bytes: int) -> MeshStore:
     url = settings.store_url.get_secret_value() if settings.store_url else None
-    return open_store(memory, settings.store_dir, settings.store_bytes, url)
+    return open_store(memory_bytes, settings.store_dir, settings.store_bytes, url)
 
 
 @asynccontextmanager

@@ -18,10 +18,9 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from service.defaults import named_versions
 from service.logs import LogFormat
+from service.memory import MEBIBYTE
 from service.origins import origins
 from service.shipped import asked_categories, usual_categories
-
-MEBIBYTE = 1024 * 1024
 
 LogLevel = Literal["critical", "error", "warning", "info", "debug"]
 
@@ -65,6 +64,11 @@ class Settings(BaseSettings):
 
     max_upload_bytes: PositiveInt = 128 * MEBIBYTE
     """Largest request body, in bytes; more is answered with 413."""
+
+    max_vertices: PositiveInt | None = None
+    """Vertices of the largest mesh that is taken, which may have twice as many faces; more is
+    answered with 413. By default what fits into the memory beside the caches, with every worker at
+    such a mesh; never more than two million."""
 
     mesh_cache_bytes: NonNegativeInt | None = None
     """Memory for meshes that requests name by `mesh_id`, in bytes; the least recently used go. By

@@ -14,6 +14,7 @@ import pytest
 from service import __main__, main
 from service.api.workers import Workers
 from service.encode.model import SHIPPED
+from service.mesh import limits
 from service.settings import Settings
 
 
@@ -109,6 +110,18 @@ def test_each_cache_takes_an_eighth_of_a_small_containers_memory(
     assert capacities(64 << 30) == (256 << 20, 256 << 20)
     assert capacities(512 << 20, mesh_cache_bytes=5) == (5, 64 << 20)
     assert capacities(512 << 20, inference_cache_bytes=0) == (64 << 20, 0)
+
+
+def test_the_largest_mesh_is_set_or_goes_by_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(main, "memory_bytes", lambda: 512 << 20)
+
+    def most(**settings: Any) -> int:
+        pool = main.create_app(Settings(workers=1, **settings)).state.context.workers
+        return int(anyio.run(pool.run, None, limits.most_vertices))
+
+    assert 130_000 < most() < 140_000
+    assert most(mesh_cache_bytes=0) > 190_000
+    assert most(max_vertices=7) == 7
 
 
 @pytest.mark.parametrize(

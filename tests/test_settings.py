@@ -15,6 +15,7 @@ GIVEN = {
     "CATEGORIES": "human, chair",
     "DEFAULT_MODELS": "chair=1.0.0, human=2",
     "MAX_UPLOAD_BYTES": "5",
+    "MAX_VERTICES": "6",
     "MESH_CACHE_BYTES": "0",
     "INFERENCE_CACHE_BYTES": "9",
     "STORE_DIR": "/s",
@@ -49,6 +50,7 @@ def test_the_defaults_serve_this_machine_only() -> None:
     settings = Settings()
     assert (settings.host, settings.port) == ("127.0.0.1", 8000)
     assert settings.max_upload_bytes == 134217728
+    assert settings.max_vertices is None
     assert settings.mesh_cache_bytes is None
     assert settings.inference_cache_bytes is None
     assert settings.store_dir is None
@@ -76,6 +78,7 @@ def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
         categories=("human", "chair"),
         default_models={"chair": "1.0.0", "human": "2"},
         max_upload_bytes=5,
+        max_vertices=6,
         mesh_cache_bytes=0,
         inference_cache_bytes=9,
         store_dir=Path("/s"),

@@ -20,6 +20,7 @@ from starlette.types import Receive
 from service import deadline, stages
 from service.api.left import ClientLeft
 from service.errors import Overloaded
+from service.mesh import limits
 
 T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
@@ -45,13 +46,21 @@ class Workers:
         pace: seconds that a request takes a worker, a moving mean; 0 before the first.
     """
 
-    def __init__(self, count: int, seconds: float = math.inf) -> None:
-        """`seconds` is the deadline of each function, from when a thread takes it up."""
+    def __init__(
+        self, count: int, seconds: float = math.inf, vertices: int = limits.VERTICES
+    ) -> None:
+        """
+        Args:
+            count: of threads.
+            seconds: the deadline of each function, from when a thread takes it up.
+            vertices: of the largest mesh that a function may read.
+        """
         self.count = count
         self.working = 0
         self.queued = 0
         self.pace = 0.0
         self._seconds = seconds
+        self._vertices = vertices
         self._turn = Semaphore(count)
         # The threads are this pool's alone: whoever has the turn waits for none.
         self._threads = CapacityLimiter(count)
@@ -138,7 +147,11 @@ class Workers:
         def limited() -> T:
             _stand_back()
             noted = nullcontext() if record is None else stages.recording(record)
-            with deadline.limit(self._seconds, abandoned), noted:
+            with (
+                deadline.limit(self._seconds, abandoned),
+                limits.at_most(self._vertices),
+                noted,
+            ):
                 return work()
 
         return await to_thread.run_sync(limited, limiter=self._threads)

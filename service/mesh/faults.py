@@ -26,7 +26,9 @@ def too_many(what: str, count: int, limit: int) -> TooLarge:
     return TooLarge(
         f"too_many_{what}",
         f"The mesh has at least {count} {what}; the limit is {limit}.",
-        "Simplify the mesh, or split it into parts.",
+        "Simplify the mesh, or split it into parts; the operator may allow more by MAX_VERTICES."
+        if what in ("vertices", "faces")
+        else "Simplify the mesh, or split it into parts.",
     )
 
 

@@ -1,14 +1,22 @@
-"""How much a file may unfold into, whatever its size: a few bytes can claim a billion vertices."""
+"""How much a file may unfold into, whatever its size: a few bytes can claim a billion vertices.
+
+An interface with less memory than that takes sets a lower limit by `at_most`; it travels in a
+context variable, as the deadline does, and for the same reason.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 from service.errors import TooLarge
 from service.mesh.faults import too_many
 
 VERTICES = 2_000_000
 FACES = 4_000_000
+# Faces that go with so many vertices.
+FACES_PER_VERTEX = 2
 # Nodes of a glTF scene, primitives that they show, chunks of a GLB: each costs some time by itself.
 PARTS = 20_000
 # Values in a JSON text, each some hundred bytes when parsed.
@@ -24,16 +32,37 @@ RATIO = 200
 SMALL = 16 << 20
 
 
+_affordable: ContextVar[int | None] = ContextVar("vertices", default=None)
+
+
+@contextmanager
+def at_most(vertices: int) -> Iterator[None]:
+    """Let meshes within the block have so many vertices, and as many faces as go with them."""
+    token = _affordable.set(vertices)
+    try:
+        yield
+    finally:
+        _affordable.reset(token)
+
+
+def most_vertices() -> int:
+    """How many vertices a mesh may have here."""
+    affordable = _affordable.get()
+    return VERTICES if affordable is None else min(VERTICES, affordable)
+
+
 def check_vertices(count: int) -> None:
     """Raise TooLarge when `count` vertices are too many."""
-    if count > VERTICES:
-        raise too_many("vertices", count, VERTICES)
+    limit = most_vertices()
+    if count > limit:
+        raise too_many("vertices", count, limit)
 
 
 def check_faces(count: int) -> None:
     """Raise TooLarge when `count` triangles are too many."""
-    if count > FACES:
-        raise too_many("faces", count, FACES)
+    limit = min(FACES, FACES_PER_VERTEX * most_vertices())
+    if count > limit:
+        raise too_many("faces", count, limit)
 
 
 def check_parts(count: int) -> None:

@@ -50,7 +50,7 @@ def obj_looks(file: ObjFile, folder: Folder | None) -> Looks | None:
         return None
     deadline.check()
     split = Split(file, normal, texture, material)
-    if len(split.of) > limits.VERTICES:
+    if len(split.of) > limits.most_vertices():
         return None
     deadline.check()
     return Looks(

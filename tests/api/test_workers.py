@@ -17,7 +17,8 @@ from starlette.types import Message
 from service import deadline, stages
 from service.api.left import ClientLeft
 from service.api.workers import NICENESS, Workers
-from service.errors import Overloaded
+from service.errors import Overloaded, TooLarge
+from service.mesh import limits
 
 
 class Caller:
@@ -254,3 +255,13 @@ def test_threads_that_work_stand_back_behind_the_event_loop() -> None:
     own = niceness()
     assert anyio.run(twice) == [min(own + NICENESS, 19)] * 2
     assert niceness() == own
+
+
+def test_meshes_are_no_larger_than_there_is_memory_for() -> None:
+    async def read(vertices: int) -> None:
+        await Workers(1, vertices=5).run(None, limits.check_vertices, vertices)
+
+    anyio.run(read, 5)
+    with pytest.raises(TooLarge):
+        anyio.run(read, 6)
+    limits.check_vertices(6)

@@ -29,6 +29,20 @@ def test_limits_are_the_last_that_pass(check: Callable[[int], None], limit: int,
     assert str(limit) in caught.value.detail
 
 
+def test_what_is_affordable_is_less() -> None:
+    with limits.at_most(10):
+        limits.check_vertices(10)
+        limits.check_faces(20)
+        with pytest.raises(TooLarge, match="the limit is 10") as caught:
+            limits.check_vertices(11)
+        assert "MAX_VERTICES" in caught.value.suggestion
+        with pytest.raises(TooLarge, match="the limit is 20"):
+            limits.check_faces(21)
+    limits.check_vertices(11)
+    with limits.at_most(limits.VERTICES + 1), pytest.raises(TooLarge):
+        limits.check_vertices(limits.VERTICES + 1)
+
+
 def test_only_large_archives_may_not_shrink_much() -> None:
     limits.check_inflated(1, [limits.SMALL])
     limits.check_inflated(limits.SMALL // limits.RATIO + 1, [limits.SMALL, 1])
