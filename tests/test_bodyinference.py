@@ -113,8 +113,10 @@ def test_an_implausible_stature_is_warned_of(
     assert warning.endswith("say units=cm")
 
 
-def test_a_body_that_the_encoder_was_not_trained_with_is_warned_of(found: BodyInference) -> None:
-    other = load_models(Path(found.model._path.parent))["human"]
+def test_a_body_that_the_encoder_was_not_trained_with_is_warned_of(
+    found: BodyInference, body_folder: Path
+) -> None:
+    other = load_models(body_folder)["human"]
     other.card = {**other.card, "template_digest": "sha256-00"}
     best = replace(found.best, model=other)
     warnings = replace(found, candidates=[best, *found.candidates[1:]]).report()["warnings"]
