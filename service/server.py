@@ -81,6 +81,8 @@ class Server(uvicorn.Server):
         if self._signalled:
             self.should_exit = self.force_exit = True
         elif sig == signal.SIGTERM:
+            # Whoever sees that it drains finds its connection closed, too.
+            self._close_connections_once_answered()
             self._readiness.drain()
         else:
             self.should_exit = True
@@ -93,11 +95,12 @@ class Server(uvicorn.Server):
             if self._drained_at is None:
                 logger.info("draining for %g s", self.config.drain_seconds)
                 self._drained_at = now + self.config.drain_seconds
-                self._close_connections_once_answered()
             over = over or now >= self._drained_at
         return over
 
     def _close_connections_once_answered(self) -> None:
+        if CLOSE in self.config.encoded_headers:
+            return
         self.config.encoded_headers.append(CLOSE)
         self.server_state.default_headers = [*self.server_state.default_headers, CLOSE]
 

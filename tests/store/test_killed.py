@@ -25,7 +25,7 @@ Start = Callable[[Path], tuple[subprocess.Popen[bytes], httpx.Client]]
 def running(store: Path, log: Path) -> Iterator[tuple[subprocess.Popen[bytes], httpx.Client]]:
     """The service with a store, and a client of it."""
     command = [sys.executable, "-m", "service", "--host", "127.0.0.1", "--port", "0"]
-    environment = {**os.environ, "STORE_DIR": str(store), "DRAIN_SECONDS": "0"}
+    environment = {**os.environ, "STORE_DIR": str(store), "DRAIN_SECONDS": "0", "QUEUE": "9"}
     with log.open("wb") as errors:
         process = subprocess.Popen(command, env=environment, stderr=errors)
     try:
