@@ -50,11 +50,11 @@ from service.api.routes import Routes
 from service.api.safety import SafetyHeaders
 from service.api.tracing import TELEMETRY
 from service.api.workers import Workers
+from service.budget import Budget
 from service.encode.catalog import Catalog
 from service.encode.installed import Installed
 from service.encode.model import SHIPPED, load_models
 from service.inferences import Inferences
-from service.memory import Memory
 from service.origins import ALL
 from service.settings import Settings
 from service.store.meshstore import MeshStore, open_store
@@ -127,11 +127,11 @@ def _context(settings: Settings) -> Context:
     body = settings.body_model
     shipped = partial(load_models, SHIPPED, threads, body, settings.categories)
     catalog = Catalog(shipped, settings.models_dir, threads, body, settings.default_models)
-    memory = Memory(memory_bytes())
-    meshes_held = memory.share(settings.mesh_cache_bytes)
-    inferences_held = memory.share(settings.inference_cache_bytes)
-    bodies_held = memory.share(settings.max_pending_bytes)
-    vertices = settings.max_vertices or memory.vertices(
+    budget = Budget(memory_bytes())
+    meshes_held = budget.share(settings.mesh_cache_bytes)
+    inferences_held = budget.share(settings.inference_cache_bytes)
+    bodies_held = budget.share(settings.max_pending_bytes)
+    vertices = settings.max_vertices or budget.vertices(
         workers, meshes_held + inferences_held + bodies_held
     )
     pool = Workers(workers, settings.deadline_seconds, vertices)

@@ -10,7 +10,7 @@ import ctypes
 import os
 from collections.abc import Callable
 
-MEBIBYTE = 1024 * 1024
+from service.budget import MEBIBYTE
 
 # Parameters of mallopt(3), by the environment variable of an operator who knows better.
 _PARAMETERS = {

@@ -16,9 +16,9 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from service.budget import MEBIBYTE
 from service.defaults import named_versions
 from service.logs import LogFormat
-from service.memory import MEBIBYTE
 from service.origins import origins
 from service.shipped import asked_categories, usual_categories
 

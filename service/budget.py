@@ -15,8 +15,8 @@ LEAST_VERTICES = 50_000
 
 
 @dataclass(frozen=True)
-class Memory:
-    """So many `bytes`, for all there is."""
+class Budget:
+    """So many `bytes` of memory, for all there is."""
 
     bytes: int
 
