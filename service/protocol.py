@@ -118,17 +118,9 @@ class Connection(H11Protocol):
         if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):
             self.transport.close()
             return
-        self.config.metrics.refuse(code)
-        trace_id = secrets.token_hex(16)
-        problem = Problem(status, code, detail, "Send a request anew.", trace_id)
-        protect(problem.headers, status)
-        headers = [
-            *problem.raw_headers,
-            (b"trace-id", trace_id.encode()),
-            (b"connection", b"close"),
-        ]
+        problem = _refusal(self.config.metrics, status, code, detail, "Send a request anew.")
         for event in (
-            h11.Response(status_code=status, headers=headers),
+            h11.Response(status_code=status, headers=problem.raw_headers),
             h11.Data(data=bytes(problem.body)),
             h11.EndOfMessage(),
         ):
@@ -141,22 +133,29 @@ def _over(since: float | None, now: float, seconds: float) -> bool:
     return since is not None and now - since > seconds
 
 
+def _refusal(metrics: Metrics, status: int, code: str, detail: str, suggestion: str) -> Problem:
+    """What the server answers in the app's stead, before it closes the connection."""
+    metrics.refuse(code)
+    trace_id = secrets.token_hex(16)
+    headers = {"Connection": "close", "Trace-Id": trace_id}
+    problem = Problem(status, code, detail, suggestion, trace_id, headers)
+    protect(problem.headers, status)
+    return problem
+
+
 def _probes_only(app: ASGIApp, metrics: Metrics) -> ASGIApp:
     async def crowded(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["path"] in PROBES:
             await app(scope, receive, send)
             return
-        trace_id = secrets.token_hex(16)
-        problem = Problem(
+        problem = _refusal(
+            metrics,
             429,
             "too_many_connections",
             "As many connections are open as this service takes.",
             "Connect again after as many seconds as Retry-After says.",
-            trace_id,
-            {"Retry-After": "1", "Connection": "close", "Trace-Id": trace_id},
         )
-        protect(problem.headers, problem.status_code)
-        metrics.refuse(problem.code)
+        problem.headers["Retry-After"] = "1"
         await problem(scope, receive, send)
 
     return crowded

@@ -11,6 +11,7 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.api.framing import declared_bytes
 from service.api.problems import from_http
 from service.api.workers import Workers
 
@@ -163,9 +164,8 @@ class Admit:
         if scope["type"] != "http" or scope["method"] != "POST":
             await self.app(scope, receive, send)
             return
-        length = Headers(scope=scope).get("content-length", "")
         try:
-            request = self.admission.enter(int(length) if length.isdecimal() else 0)
+            request = self.admission.enter(declared_bytes(Headers(scope=scope)))
         except HTTPException as error:
             await sleep(self.admission.hold())
             await from_http(scope, error)(scope, receive, send)

@@ -7,8 +7,9 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.api.keys import Keys
 from service.api.problems import Problem
+from service.api.routes import PROBES
 
-OPEN_PATHS = frozenset({"/", "/docs", "/livez", "/metrics", "/openapi.json", "/readyz"})
+OPEN_PATHS = frozenset({"/", "/docs", "/openapi.json"}) | PROBES
 """What needs no key: probes, and pages that hold nobody's data."""
 
 OPEN_FOLDER = "/web/"

@@ -9,6 +9,7 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.api.framing import declared_bytes
 from service.api.left import ClientLeft
 from service.api.problems import from_http
 
@@ -34,8 +35,7 @@ class BodyLimit:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        declared = Headers(scope=scope).get("content-length", "")
-        if declared.isdecimal() and int(declared) > self.limit:
+        if declared_bytes(Headers(scope=scope)) > self.limit:
             problem = from_http(scope, self._too_large())
             await problem(scope, receive, send)
             return

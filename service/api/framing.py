@@ -1,4 +1,4 @@
-"""Requests that say twice how long they are: proxies and servers may choose differently."""
+"""How long a request says that its body is; one that says it twice is refused."""
 
 from __future__ import annotations
 
@@ -8,11 +8,18 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from service.api.problems import Problem
 
 
+def declared_bytes(headers: Headers) -> int:
+    """Bytes of the body, as far as the head tells."""
+    declared = headers.get("content-length", "")
+    return int(declared) if declared.isdecimal() else 0
+
+
 class Framing:
     """Middleware: refuses what has both a Content-Length and a Transfer-Encoding, and hangs up.
 
-    By such a request one client can put another's words into a connection that a proxy shares
-    between them (request smuggling; RFC 9112, section 6.1).
+    Proxies and servers may choose differently between them, and so one client can put another's
+    words into a connection that a proxy shares between them (request smuggling; RFC 9112, section
+    6.1).
     """
 
     def __init__(self, app: ASGIApp) -> None:

@@ -10,6 +10,8 @@ from anyio import move_on_after
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.api.framing import declared_bytes
+
 PATIENCE_S = 2.0
 """How long the rest of a body is waited for, in seconds."""
 
@@ -36,8 +38,7 @@ class Linger:
             await self.app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        declared = headers.get("content-length", "")
-        length = int(declared) if declared.isdecimal() else 0
+        length = declared_bytes(headers)
         unread = length > 0 or "transfer-encoding" in headers
         small = 0 < length <= SMALL
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
+from service.encode.card import unreadable
 from service.encode.discriminator import DISCRIMINATOR_SUFFIX
 from service.encode.installed import Installed as Installed
 from service.encode.meshencoder import MESH_SUFFIX
@@ -151,11 +152,7 @@ class Catalog:
         except Exception as error:
             # Whatever a bad file sets off, the other models are served.
             logger.exception("%s can't be loaded", card)
-            raise ModelFault(
-                "model_unreadable",
-                f"{card.name} can't be loaded: {type(error).__name__}",
-                "Export the model again, or remove it from the models folder.",
-            ) from error
+            raise unreadable(card, type(error).__name__) from error
 
     def _digest(self, card: Path) -> str:
         files = {suffix: card.with_suffix(suffix) for suffix in SUFFIXES}
