@@ -11,10 +11,11 @@ from starlette.responses import Response
 
 from service import pipeline
 from service.api.accept import negotiate
+from service.api.asked import Asked, answered
 from service.api.context import Shared
-from service.api.etags import REVALIDATED, named, not_modified, validator, weak
+from service.api.etags import REVALIDATED, named, not_modified, weak
 from service.api.filenames import edited_name
-from service.api.forms import EditForm, form_content_type, upload_of
+from service.api.forms import EditForm, form_content_type
 from service.api.keeping import EDITED, keep, owner_of
 from service.api.mesh_response import mesh_response
 from service.api.problems import documented
@@ -22,11 +23,8 @@ from service.api.report_response import report_response
 from service.api.schemas import MESH_CONTENT, MESH_HEADERS, EditReport
 from service.constraints import NONE, parse_constraints
 from service.edits import parse_edits
-from service.encode.model import Model
 from service.errors import NotFound
-from service.inferences import Inferences
 from service.requests import Upload
-from service.store.meshstore import MeshStore
 
 JSON = "application/json"
 
@@ -76,32 +74,23 @@ async def edit(
     form: Annotated[EditForm, Form(media_type="multipart/form-data")],
     shared: Shared,
 ) -> Response:
-    upload = await upload_of(request, form, shared.store)
-    models = await shared.readiness.models()
-    run, kept = shared.workers.run, (shared.store, shared.inferences)
-    return await run(request, _edit, request, form, upload, models, *kept)
+    return await answered(request, form, shared, _edit)
 
 
-def _edit(
-    request: Request,
-    form: EditForm,
-    upload: Upload,
-    models: Mapping[str, Model],
-    store: MeshStore,
-    known: Inferences,
-) -> Response:
-    inside = validator(request, upload, form, models)
-    if (tag := _held(request, upload, store, inside)) is not None:
+def _edit(asked: Asked[EditForm]) -> Response:
+    request, form, upload = asked.request, asked.form, asked.upload
+    inside = asked.validator()
+    if (tag := _held(asked, inside)) is not None:
         return not_modified(tag, _HEADERS)
     edits = parse_edits(form.edits) if form.edits is not None else {}
     constraints = parse_constraints(form.constraints) if form.constraints is not None else NONE
     options = form.infer_options(), edits, form.edit_options()
-    edited = pipeline.edit(upload, models, *options, constraints, known)
+    edited = pipeline.edit(upload, asked.models, *options, constraints, asked.known)
     request.state.report = edited.report
     result = Upload(edited.data, edited_name(upload.name, edited.format), edited.media_type)
     accept = ",".join(request.headers.getlist("accept"))
     if negotiate(accept, [edited.media_type, JSON]) == JSON:
-        warnings = keep(request, store, upload) + keep(request, store, result, EDITED)
+        warnings = asked.keep() + keep(request, asked.store, result, EDITED)
         ids = {"mesh_id": result.mesh_id, "source_mesh_id": upload.mesh_id}
         inside = _of_report(inside, result.mesh_id)
         return report_response(request, {**ids, **edited.report}, warnings, inside, _HEADERS)
@@ -109,22 +98,22 @@ def _edit(
     return mesh_response(request, result, weak(inside), headers)
 
 
-def _held(request: Request, upload: Upload, store: MeshStore, inside: str) -> str | None:
+def _held(asked: Asked[EditForm], inside: str) -> str | None:
     """The tag of an answer that the client holds and that would be the same now.
 
     A report names the edited mesh, which must still be there.  So its tag holds that mesh's id:
     nothing else knows it before the edit is made again.
     """
-    for tag in named(request):
+    for tag in named(asked.request):
         if tag == inside:
             return weak(tag)
         mesh_id = tag.removeprefix(_of_report(inside, ""))
         if mesh_id != tag:
             try:
-                store.get(mesh_id, owner_of(request))
+                asked.store.get(mesh_id, owner_of(asked.request))
             except NotFound:
                 continue
-            if not keep(request, store, upload):
+            if not asked.keep():
                 return weak(tag)
     return None
 

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Form, Request
 from starlette.responses import JSONResponse, Response
 
 from service import pipeline
+from service.api.asked import Asked, answered
 from service.api.context import Shared
-from service.api.etags import REVALIDATED, named, not_modified, validator, weak
-from service.api.forms import InferForm, form_content_type, upload_of
-from service.api.keeping import keep
+from service.api.etags import REVALIDATED, named, not_modified, weak
+from service.api.forms import InferForm, form_content_type
 from service.api.problems import documented
 from service.api.report_response import report_response
 from service.api.schemas import TAG_HEADERS, InferReport
-from service.encode.model import Model
-from service.inferences import Inferences
-from service.requests import Upload
-from service.store.meshstore import MeshStore
 
 router = APIRouter(tags=["shapes"])
 
@@ -48,23 +43,14 @@ async def infer(
     form: Annotated[InferForm, Form(media_type="multipart/form-data")],
     shared: Shared,
 ) -> Response:
-    upload = await upload_of(request, form, shared.store)
-    models = await shared.readiness.models()
-    run, kept = shared.workers.run, (shared.store, shared.inferences)
-    return await run(request, _infer, request, form, upload, models, *kept)
+    return await answered(request, form, shared, _infer)
 
 
-def _infer(
-    request: Request,
-    form: InferForm,
-    upload: Upload,
-    models: Mapping[str, Model],
-    store: MeshStore,
-    known: Inferences,
-) -> Response:
-    inside = validator(request, upload, form, models)
-    if inside in named(request) and not keep(request, store, upload):
+def _infer(asked: Asked[InferForm]) -> Response:
+    request, inside = asked.request, asked.validator()
+    if inside in named(request) and not asked.keep():
         return not_modified(weak(inside), REVALIDATED)
-    report = pipeline.infer(upload, models, form.infer_options(), known).report()
+    options = asked.form.infer_options()
+    report = pipeline.infer(asked.upload, asked.models, options, asked.known).report()
     request.state.report = report
-    return report_response(request, report, keep(request, store, upload), inside, REVALIDATED)
+    return report_response(request, report, asked.keep(), inside, REVALIDATED)

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Form, Request
 from starlette.responses import Response
 
 from service import pipeline
-from service.api.context import Context, Shared
-from service.api.etags import REVALIDATED, named, not_modified, validator, weak
+from service.api.asked import Asked, answered
+from service.api.context import Shared
+from service.api.etags import REVALIDATED, named, not_modified, weak
 from service.api.filenames import derived_name
-from service.api.forms import SlidersForm, form_content_type, upload_of
-from service.api.keeping import keep
+from service.api.forms import SlidersForm, form_content_type
 from service.api.mesh_response import MEDIA_TYPES, mesh_response
 from service.api.problems import documented
 from service.api.schemas import BINARY, MESH_HEADERS
 from service.encode.model import Model
 from service.inferences import Inferences
 from service.requests import InferOptions, SliderOptions, Upload
-from service.store.meshstore import MeshStore
 
 GLB = MEDIA_TYPES[".glb"]
 Make = Callable[[Upload, Mapping[str, Model], InferOptions, SliderOptions, Inferences], bytes]
@@ -59,7 +59,7 @@ async def sliders(
     form: Annotated[SlidersForm, Form(media_type="multipart/form-data")],
     shared: Shared,
 ) -> Response:
-    return await _answer(request, form, shared, pipeline.sliders, "sliders")
+    return await answered(request, form, shared, partial(_made, pipeline.sliders, "sliders"))
 
 
 @router.post(
@@ -76,33 +76,16 @@ async def template(
     form: Annotated[SlidersForm, Form(media_type="multipart/form-data")],
     shared: Shared,
 ) -> Response:
-    return await _answer(request, form, shared, pipeline.template, "template")
+    return await answered(request, form, shared, partial(_made, pipeline.template, "template"))
 
 
-async def _answer(
-    request: Request, form: SlidersForm, shared: Context, make: Make, suffix: str
-) -> Response:
-    upload = await upload_of(request, form, shared.store)
-    models = await shared.readiness.models()
-    run, kept = shared.workers.run, (shared.store, shared.inferences)
-    return await run(request, _made, request, form, upload, models, *kept, make, suffix)
-
-
-def _made(
-    request: Request,
-    form: SlidersForm,
-    upload: Upload,
-    models: Mapping[str, Model],
-    store: MeshStore,
-    known: Inferences,
-    make: Make,
-    suffix: str,
-) -> Response:
-    inside = validator(request, upload, form, models)
-    if inside in named(request):
-        keep(request, store, upload)
+def _made(make: Make, suffix: str, asked: Asked[SlidersForm]) -> Response:
+    form, inside = asked.form, asked.validator()
+    if inside in named(asked.request):
+        asked.keep()
         return not_modified(weak(inside), REVALIDATED)
-    data = make(upload, models, form.infer_options(), form.slider_options(), known)
-    keep(request, store, upload)
-    result = Upload(data, derived_name(upload.name, suffix, "glb"), GLB)
-    return mesh_response(request, result, weak(inside), REVALIDATED)
+    options = form.infer_options(), form.slider_options()
+    data = make(asked.upload, asked.models, *options, asked.known)
+    asked.keep()
+    result = Upload(data, derived_name(asked.upload.name, suffix, "glb"), GLB)
+    return mesh_response(asked.request, result, weak(inside), REVALIDATED)
