@@ -10,6 +10,7 @@ from typing import Any
 import anyio
 import httpx
 import pytest
+from fastapi import Request
 
 from service import __main__, main
 from service.api.workers import Workers
@@ -117,7 +118,8 @@ def test_the_largest_mesh_is_set_or_goes_by_the_memory(monkeypatch: pytest.Monke
 
     def most(**settings: Any) -> int:
         pool = main.create_app(Settings(workers=1, **settings)).state.context.workers
-        return int(anyio.run(pool.run, None, limits.most_vertices))
+        request = Request({"type": "http"}, anyio.sleep_forever)
+        return int(anyio.run(pool.run, request, limits.most_vertices))
 
     assert 130_000 < most() < 140_000
     assert most(mesh_cache_bytes=0) > 190_000

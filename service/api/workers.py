@@ -66,7 +66,7 @@ class Workers:
         self._threads = CapacityLimiter(count)
 
     async def run(
-        self, request: Request | None, function: Callable[[*Arguments], T], *arguments: *Arguments
+        self, request: Request, function: Callable[[*Arguments], T], *arguments: *Arguments
     ) -> T:
         """The function's result, computed in a thread; its error is raised here.
 
@@ -80,9 +80,6 @@ class Workers:
         abandoned = Event()
         work = partial(function, *arguments)
         try:
-            if request is None:
-                async with self._in_turn():
-                    return await self._in_thread(work, abandoned, None)
             record: stages.Record | None = getattr(request.state, "record", None)
             return await self._while_there(request.receive, work, abandoned, record)
         finally:
@@ -118,7 +115,7 @@ class Workers:
         return results[0]
 
     @asynccontextmanager
-    async def _in_turn(self, record: stages.Record | None = None) -> AsyncIterator[None]:
+    async def _in_turn(self, record: stages.Record | None) -> AsyncIterator[None]:
         epoch, start = time.time(), time.monotonic()
         self.queued += 1
         try:

@@ -90,11 +90,9 @@ def test_first_come_first_served() -> None:
     assert order == list(range(8))
 
 
-@pytest.mark.parametrize("asked", [True, False])
-def test_results_and_errors_come_back(asked: bool) -> None:
+def test_results_and_errors_come_back() -> None:
     async def divide(a: int, b: int) -> float:
-        request = Caller().request if asked else None
-        return await Workers(1).run(request, lambda x, y: x / y, a, b)
+        return await Workers(1).run(Caller().request, lambda x, y: x / y, a, b)
 
     assert anyio.run(divide, 6, 3) == 2.0
     with pytest.raises(ZeroDivisionError):
@@ -110,9 +108,9 @@ def test_each_function_has_its_own_deadline() -> None:
     async def two() -> str:
         workers = Workers(1, 0.05)
         with pytest.raises(Overloaded):
-            await workers.run(None, work, 0.1)
+            await workers.run(Caller().request, work, 0.1)
         # What others took before is no part of it.
-        return await workers.run(None, work, 0.0)
+        return await workers.run(Caller().request, work, 0.0)
 
     assert anyio.run(two) == "done"
     deadline.check()
@@ -125,13 +123,13 @@ def test_what_waited_longer_than_the_deadline_is_not_begun() -> None:
     async def wait_too_long() -> None:
         workers = Workers(1, 0.05)
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(workers.run, None, gate.wait, 20)
+            tasks.start_soon(workers.run, Caller().request, gate.wait, 20)
             await until(lambda: workers.working == 1)
             tasks.start_soon(expect, Overloaded, workers.run(Caller().request, begun.append, 1))
             await until(lambda: workers.queued == 1)
             await anyio.sleep(0.06)
             gate.set()
-        await workers.run(None, begun.append, 2)
+        await workers.run(Caller().request, begun.append, 2)
 
     anyio.run(wait_too_long)
     assert begun == [2]
@@ -145,7 +143,7 @@ def test_a_client_that_leaves_the_queue_leaves_its_place() -> None:
         workers = Workers(1)
         caller = Caller()
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(workers.run, None, gate.wait, 20)
+            tasks.start_soon(workers.run, Caller().request, gate.wait, 20)
             await until(lambda: workers.working == 1)
             tasks.start_soon(expect, ClientLeft, workers.run(caller.request, begun.append, 1))
             await until(lambda: workers.queued == 1)
@@ -218,7 +216,7 @@ def test_the_wait_and_the_stages_are_recorded() -> None:
     async def queue() -> None:
         workers = Workers(1)
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(workers.run, None, gate.wait, 20)
+            tasks.start_soon(workers.run, Caller().request, gate.wait, 20)
             await until(lambda: workers.working == 1)
             tasks.start_soon(workers.run, Caller(record=record).request, work)
             await until(lambda: workers.queued == 1)
@@ -234,7 +232,6 @@ def test_the_wait_and_the_stages_are_recorded() -> None:
 def test_the_pace_is_that_of_requests() -> None:
     async def work() -> float:
         workers = Workers(1)
-        await workers.run(None, time.sleep, 0.05)
         assert workers.pace == 0
         for _ in range(3):
             await workers.run(Caller().request, time.sleep, 0.02)
@@ -259,7 +256,7 @@ def test_threads_that_work_stand_back_behind_the_event_loop() -> None:
 
 def test_meshes_are_no_larger_than_there_is_memory_for() -> None:
     async def read(vertices: int) -> None:
-        await Workers(1, vertices=5).run(None, limits.check_vertices, vertices)
+        await Workers(1, vertices=5).run(Caller().request, limits.check_vertices, vertices)
 
     anyio.run(read, 5)
     with pytest.raises(TooLarge):
