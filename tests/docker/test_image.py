@@ -72,7 +72,7 @@ def test_a_lock_is_pinned_hashed_and_names_no_index(name: str) -> None:
     assert not re.search(r"^\s*--?(index|extra-index|find-links|i )|://", text, re.M)
 
 
-@pytest.mark.parametrize("package", ["torch", "pip", "setuptools", "pytest", "httpx"])
+@pytest.mark.parametrize("package", ["torch", "pip", "setuptools", "pytest", "pyarrow", "ray"])
 def test_the_lock_has_nothing_that_serves_no_request(package: str) -> None:
     assert package not in locked("requirements.lock")
 
