@@ -1,5 +1,6 @@
 HOST ?= 127.0.0.1
 PORT ?= 8000
+JOBS_DIR ?= .jobs
 PYTHON ?= python3
 BIN = .venv/bin
 
@@ -7,16 +8,21 @@ ENGINE ?= docker
 IMAGE ?= shape-parameters
 BASE_IMAGE ?= python:3.11-slim-bookworm
 
-.PHONY: serve test chromium openapi lock image image-test clean
+.PHONY: serve test test-ray chromium openapi lock image image-test clean
 
+# Jobs of one's own machine outlive a restart; elsewhere nothing is written unless it is asked for.
 serve: .venv/serve  ## run the service on HOST:PORT
-	@HOST=$(HOST) PORT=$(PORT) $(BIN)/python -m service
+	@HOST=$(HOST) PORT=$(PORT) JOBS_DIR=$(JOBS_DIR) $(BIN)/python -m service
 
 test: .venv/dev chromium  ## lint, type-check and test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest
+
+# Ray is large, and what it does is tested apart, in an environment of its own.
+test-ray: .venv-ray/batch  ## test augmentation on a Ray cluster of this machine
+	.venv-ray/bin/pytest tests/ray
 
 # The viewer is tested in a real browser. Where one is missing and can be had at once, it is had;
 # elsewhere those tests are skipped, and say so.
@@ -49,8 +55,8 @@ image:  ## build the image with ENGINE, docker or podman
 image-test: .venv/dev  ## build the image, run it confined, and try it; minutes
 	$(BIN)/python tests/docker/run.py --engine $(ENGINE) --base $(BASE_IMAGE)
 
-clean:  ## remove the environment
-	rm -rf .venv
+clean:  ## remove the environments
+	rm -rf .venv .venv-ray
 
 # The environment is made once for each set of dependencies.
 .venv/serve: pyproject.toml
@@ -62,3 +68,8 @@ clean:  ## remove the environment
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[train,dev]'
 	@touch $@ .venv/serve
+
+.venv-ray/batch: pyproject.toml
+	test -x .venv-ray/bin/python || $(PYTHON) -m venv .venv-ray
+	.venv-ray/bin/pip install --quiet --disable-pip-version-check -e '.[batch,dev]'
+	@touch $@
