@@ -84,7 +84,7 @@ def _values(found: BodyInference, edits: Mapping[str, Change]) -> Array:
             raise _fixed(f"{TALLER} is to be changed too", f"Leave out {TALLER} or {STATURE}.")
         now = found.stature(found.fit.body)
         target = edits[STATURE].apply(now)
-        if target == now:
+        if target == now and np.array_equal(values[ANGLES:], found.parameters[ANGLES:]):
             return values
         if target <= 0.0:
             raise InvalidRequest(

@@ -1,17 +1,13 @@
-"""Infer and edit as plain functions of bytes and values: what every interface calls."""
+"""Infer, edit and transfer as plain functions of bytes and values: what every interface calls."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-import numpy as np
-
-from service import affineedit, affinesliders, bodyedit, bodysliders
-from service.affineinference import AffineInference
+from service import affineedit, affinesliders, affinetransfer, bodyedit, bodysliders, bodytransfer
 from service.bodyinference import BodyInference
 from service.constraints import NONE, Interval
 from service.edited import Edited, Moved, write_edited
@@ -20,27 +16,20 @@ from service.encode.affinemodel import AffineModel
 from service.encode.basemodel import Model
 from service.encode.bodymodel import BodyModel
 from service.encode.debugmodel import DebugModel
-from service.encode.recognition import recognise
-from service.encode.versions import choose
 from service.errors import InvalidRequest
+from service.finding import blaming, inferred, require_recognised
 from service.inference import Inference
 from service.inferences import Inferences
-from service.mesh.formats import detect, read_mesh
-from service.mesh.frame import AUTO, Orientation, orientations
-from service.mesh.meshfile import MeshFile
-from service.mesh.surface import Samples, Surface, sample_surface
 from service.requests import (
     MODES,
-    UNITS,
     EditOptions,
     InferOptions,
     SliderOptions,
+    TransferOptions,
     Upload,
-    file_unit,
-    require_units,
 )
 from service.skeleton import Skeleton
-from service.stages import stage
+from service.transfer import Taken, require_alike, require_transfer, told
 
 
 @dataclass(frozen=True)
@@ -48,23 +37,37 @@ class _Kind:
     """What depends on the kind of a category.
 
     Attributes:
-        inference: what is known of an upload of one.
         move: carries out an edit of it.
         sliders: puts all edits of it into a GLB.
         template: puts all edits of what was fitted into one.
+        take: what an edit takes from another.
+        place: puts the edited one where it, or the other, stands.
     """
 
-    inference: type[Inference]
     move: Callable[[Any, Mapping[str, Change], EditOptions, str, Mapping[str, Interval]], Moved]
     sliders: Callable[[Any, SliderOptions, str], bytes]
     template: Callable[[Any, SliderOptions, str], bytes]
+    take: Callable[[Any, Any, TransferOptions], Taken]
+    place: Callable[[Moved, Any, str], Moved]
 
 
-_AFFINE = _Kind(AffineInference, affineedit.move, affinesliders.sliders, affinesliders.template)
+_AFFINE = _Kind(
+    affineedit.move,
+    affinesliders.sliders,
+    affinesliders.template,
+    affinetransfer.take,
+    affinetransfer.place,
+)
 _KINDS = {
     AffineModel.kind: _AFFINE,
     DebugModel.kind: _AFFINE,
-    BodyModel.kind: _Kind(BodyInference, bodyedit.move, bodysliders.sliders, bodysliders.template),
+    BodyModel.kind: _Kind(
+        bodyedit.move,
+        bodysliders.sliders,
+        bodysliders.template,
+        bodytransfer.take,
+        bodytransfer.place,
+    ),
 }
 
 
@@ -86,7 +89,7 @@ def infer(
     Raises:
         ShapeError: for a file that can't be served, or an option that makes no sense.
     """
-    with _inferred(upload, models, options, known) as found:
+    with inferred(upload, models, options, known) as found:
         return found
 
 
@@ -107,11 +110,54 @@ def edit(
         ShapeError: as `infer`, and for an edit that can't be made, or constraints that conflict.
     """
     _require_mode(edit_options.mode)
-    with _inferred(upload, models, options, known) as found:
-        _require_recognised(found, options.category)
+    with inferred(upload, models, options, known) as found:
+        require_recognised(found, options.category)
         keep = _anchor(found.model, edit_options.keep)
         moved = _KINDS[found.model.kind].move(found, edits, edit_options, keep, constraints)
         return write_edited(moved, edit_options.format)
+
+
+def transfer(
+    source: Upload,
+    target: Upload,
+    models: Mapping[str, Model],
+    options: InferOptions,
+    target_options: InferOptions,
+    transfer_options: TransferOptions,
+    known: Inferences | None = None,
+) -> Edited:
+    """Edit the source's parameters to the target's: the paper's mode from source to target.
+
+    Args:
+        source: the file that is edited and answered.
+        target: the file whose parameters it gets.
+        models: the categories.
+        options, target_options: what the client says of each.
+        transfer_options: what is taken from the target, and how the edit is carried out.
+        known: as in `infer`, of both.
+
+    Raises:
+        ShapeError: as `edit`; details begin with ``source:`` or ``target:`` where one of the two
+            is at fault.  ``categories_differ`` for shapes of two categories.
+    """
+    _require_mode(transfer_options.mode)
+    require_transfer(transfer_options)
+    with ExitStack() as stack:
+        with blaming("source"):
+            found = stack.enter_context(inferred(source, models, options, known))
+        with blaming("target"):
+            other = stack.enter_context(inferred(target, models, target_options, known))
+        require_alike(found, other)
+        with blaming("source"):
+            require_recognised(found, options.category)
+        with blaming("target"):
+            require_recognised(other, target_options.category)
+        kind, keep = _KINDS[found.model.kind], _anchor(found.model, transfer_options.keep)
+        taken = kind.take(found, other, transfer_options)
+        moved = kind.move(found, taken.edits, transfer_options, keep, NONE)
+        where = other if transfer_options.position == "target" else found
+        moved = kind.place(moved, where, keep)
+        return told(write_edited(moved, transfer_options.format), taken, transfer_options)
 
 
 def sliders(
@@ -126,8 +172,8 @@ def sliders(
     Raises:
         ShapeError: as `infer`, and for options that make no sense.
     """
-    with _inferred(upload, models, options, known) as found:
-        _require_recognised(found, options.category)
+    with inferred(upload, models, options, known) as found:
+        require_recognised(found, options.category)
         keep = _anchor(found.model, slider_options.keep)
         return _KINDS[found.model.kind].sliders(found, slider_options, keep)
 
@@ -144,7 +190,7 @@ def template(
     Raises:
         ShapeError: as `sliders`.
     """
-    with _inferred(upload, models, options, known) as found:
+    with inferred(upload, models, options, known) as found:
         keep = _anchor(found.model, slider_options.keep)
         return _KINDS[found.model.kind].template(found, slider_options, keep)
 
@@ -160,8 +206,8 @@ def skeleton(
     Raises:
         ShapeError: as `infer`, and when it is no body.
     """
-    with _inferred(upload, models, options, known) as found:
-        _require_recognised(found, options.category)
+    with inferred(upload, models, options, known) as found:
+        require_recognised(found, options.category)
         if not isinstance(found, BodyInference):
             raise InvalidRequest(
                 "no_skeleton",
@@ -169,50 +215,6 @@ def skeleton(
                 "Send a mesh of a category of bodies.",
             )
         return Skeleton.of(found)
-
-
-def _inferred(
-    upload: Upload,
-    models: Mapping[str, Model],
-    options: InferOptions,
-    known: Inferences | None,
-) -> AbstractContextManager[Inference]:
-    """What is known of an upload, or is now found; within the block it may be asked for more."""
-    chosen = choose(models, options.category)
-    require_units(options.units)
-    ways = orientations(options.up, options.front)
-    find = partial(_find, upload, chosen, ways, options)
-    if known is None:
-        return nullcontext(find())
-    # Models are told apart as objects: those that were loaded anew may be others of the same name.
-    format = detect(upload.data, upload.name, upload.content_type)
-    return known.held((upload.mesh_id, format, options, *chosen), find)
-
-
-def _find(
-    upload: Upload, models: Sequence[Model], ways: Sequence[Orientation], options: InferOptions
-) -> Inference:
-    with stage("read"):
-        mesh = read_mesh(upload.data, upload.name, upload.content_type)
-    # glTF is in metres whatever the client's unit; other files are in the unit it names.
-    unit = file_unit(mesh.format, options.units)
-    with stage("encode"):
-        samples = {points: _sample(mesh, points) for points in {model.points for model in models}}
-        surface = Surface(mesh.vertices, mesh.faces, 1.0 / unit)
-        candidates = recognise(models, samples, ways, options.refine, surface)
-    kind = _KINDS[candidates[0].model.kind]
-    return kind.inference(upload, mesh, candidates, options.units, unit / UNITS[options.units])
-
-
-def _require_recognised(found: Inference, category: str) -> None:
-    """An edit of what is taken for something else would only bend it."""
-    if category == AUTO and not found.in_distribution:
-        raise InvalidRequest(
-            "not_recognised",
-            f"the mesh is most like a {found.model.name}, but does not look like one "
-            f"(score {found.best.score:.2f})",
-            f"Send category={found.model.name} to edit it as one all the same.",
-        )
 
 
 def _require_mode(mode: str) -> None:
@@ -231,8 +233,3 @@ def _anchor(model: Model, keep: str | None) -> str:
             f"Use one of {', '.join(model.keeps)}.",
         )
     return keep or model.keeps[0]
-
-
-def _sample(mesh: MeshFile, points: int) -> Samples:
-    """The same samples for the same mesh, always."""
-    return sample_surface(mesh.vertices, mesh.visible, points, np.random.default_rng(0))

@@ -54,6 +54,27 @@ class EditOptions:
     strict: bool = False
 
 
+SIZES = ("target", "source")
+"""Whose size a transfer comes to: the target's, in real units, or the source's own."""
+POSITIONS = ("source", "target")
+"""Where the result of a transfer stands: where the source does, or where the target does."""
+
+
+@dataclass(frozen=True)
+class TransferOptions(EditOptions):
+    """How an edit is carried out whose values come from another shape.
+
+    Attributes:
+        parameters: names of those that are taken; None for all.
+        size: one of `SIZES`.
+        position: one of `POSITIONS`.
+    """
+
+    parameters: tuple[str, ...] | None = None
+    size: str = "target"
+    position: str = "source"
+
+
 RESTS = ("upload", "t_pose")
 """Poses that a body's mesh may be bound in."""
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 import service
-from service import pipeline
+from service import finding, pipeline
 from service.edited import Edited
 from service.edits import parse_edits
 from service.encode.model import Model, load_models
@@ -293,14 +293,14 @@ def test_its_size_is_what_is_freed_with_it(
 def test_two_requests_for_one_mesh_infer_once(
     uploads: dict[str, Upload], models: dict[str, Model], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    known, both, read = Inferences(1 << 28), threading.Barrier(2), pipeline.read_mesh
+    known, both, read = Inferences(1 << 28), threading.Barrier(2), finding.read_mesh
     reads: Iterator[int] = iter(range(10))
 
     def count(*given: Any) -> Any:
         next(reads)
         return read(*given)
 
-    monkeypatch.setattr(pipeline, "read_mesh", count)
+    monkeypatch.setattr(finding, "read_mesh", count)
 
     def ask(edits: str) -> Edited:
         both.wait(10)

@@ -1,0 +1,128 @@
+"""Transfers between rigid shapes: lengths, in real units or in proportion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.affineinference import AffineInference
+from service.edited import Moved
+from service.requests import TransferOptions
+from service.sliders import chosen
+from service.template.affine import AffineTemplate
+from service.transfer import (
+    Taken,
+    canonical,
+    extents,
+    of_target,
+    set_to,
+    shifted,
+    unit_ratio,
+)
+
+Array = NDArray[np.float64]
+
+
+def take(found: AffineInference, other: AffineInference, options: TransferOptions) -> Taken:
+    """What an edit of a shape takes from another.
+
+    Lengths are the target's own; with ``size=source`` times the ratio of the diagonals of the two
+    meshes' bounding boxes along the canonical axes, so that the target's proportions come at the
+    source's size.
+
+    Args:
+        found: the source.
+        other: the target.
+        options: what to take; parameters and derived dimensions may be named.
+
+    Raises:
+        InvalidRequest: for an unknown name.
+    """
+    names, warnings = _moving(_wanted(found, other, options), found, other)
+    ratio = unit_ratio(found, other)
+    scale = _size(found) / (_size(other) * ratio) if options.size == "source" else 1.0
+    theirs, own = _values(other), _values(found)
+    values = {name: theirs[name] * ratio for name in names}
+    edits = set_to({name: value * scale for name, value in values.items()}, own)
+    units = dict.fromkeys(names, found.unit)
+    return Taken(edits, values, units, scale, [*of_target(other.warnings), *warnings])
+
+
+def _wanted(
+    found: AffineInference, other: AffineInference, options: TransferOptions
+) -> Sequence[str]:
+    """Names of what to take: of what both have, which may be of two versions of a model."""
+    template, theirs = found.model.template, other.model.template
+    both = [name for name in _public(template) if name in _public(theirs)]
+    if options.parameters is None:
+        return both
+    derived = [name for name in template.derived if name in theirs.derived]
+    return chosen([*both, *derived], options.parameters, template.name)
+
+
+def _public(template: AffineTemplate) -> list[str]:
+    return [name for name, seen in zip(template.names, template.public, strict=True) if seen]
+
+
+def _moving(
+    names: Sequence[str], found: AffineInference, other: AffineInference
+) -> tuple[list[str], list[str]]:
+    """Those of the names that move something in both variants, and a warning of the others."""
+    idle = {name for shape in (found, other) for name in _idle(shape.fit.template)}
+    warnings = []
+    for whose, shape in (("source", found), ("target", other)):
+        still = [name for name in names if name in _idle(shape.fit.template)]
+        if still:
+            warnings.append(
+                f"{', '.join(still)} {'is' if len(still) == 1 else 'are'} left out: the {whose} is "
+                f"a {shape.fit.template.variant.replace('_', ' ')}, which has nothing of the kind"
+            )
+    return [name for name in names if name not in idle], warnings
+
+
+def _idle(template: AffineTemplate) -> list[str]:
+    """Parameters that move nothing in a variant."""
+    return [name for name, moves in zip(template.names, template.active, strict=True) if not moves]
+
+
+def _values(found: AffineInference) -> dict[str, float]:
+    """Parameters and derived dimensions by name, as `POST /infer` tells them."""
+    own = dict(zip(found.model.template.names, found.parameters.tolist(), strict=True))
+    return own | found.dimensions().derived(found.parameters)
+
+
+def _size(found: AffineInference) -> float:
+    """Diagonal of the mesh's bounding box, in the reported unit."""
+    return float(np.linalg.norm(extents(found))) * found.unit_scale
+
+
+def place(moved: Moved, where: AffineInference, keep: str) -> Moved:
+    """The edited mesh where a shape stands: an edit leaves it where it was itself.
+
+    Args:
+        moved: the edit.
+        where: the source or the target.
+        keep: the point that is to be there.
+    """
+    found = moved.found
+    assert isinstance(found, AffineInference)
+    if where is found:
+        return moved
+    goal = _foothold(where, where.mesh.vertices, keep) * unit_ratio(found, where)
+    return shifted(moved, goal - _foothold(found, moved.vertices, keep))
+
+
+def _foothold(found: AffineInference, vertices: Array, keep: str) -> Array:
+    """``[3]`` the kept point, canonical and in the reported unit; an edit leaves it there.
+
+    The floor is where the vertices themselves stand on it.
+    """
+    fit = found.fit
+    constant, rows = fit.template.anchor(keep)
+    point = fit.normalization.invert(constant + rows @ fit.parameters + fit.translation)
+    point = point * found.unit_scale
+    if keep == "floor" and fit.template.stands:
+        point[1] = canonical(found, vertices)[:, 1].min()
+    return np.asarray(point)
