@@ -1,4 +1,4 @@
-"""Meshes that detailed chairs are put together from: rounded slabs, tubes along a path, bars."""
+"""Meshes that detailed shapes are put together from: rounded slabs, tubes along a path, bars."""
 
 from __future__ import annotations
 
@@ -84,6 +84,3 @@ def join(pieces: list[Mesh]) -> Mesh:
     offsets = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
     faces = [face + offset for (_, face), offset in zip(pieces, offsets[:-1], strict=True)]
     return np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
-
-
-# --- a chair of many pieces -----------------------------------------------------------------------

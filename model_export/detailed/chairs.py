@@ -1,22 +1,20 @@
-"""Chairs in detail, with known parameters and their own true edit, to judge the transfer by.
+"""Detailed chairs, and what a true edit of one does.
 
-Each is generated from the template's parameters and a style drawn once from a seed: running the
-generator again with other parameters is the true edit, vertex by vertex.  The truth is a
-carpenter's: a wider chair has a wider seat, cushion, apron and rails, while legs, posts and arms
-move apart and keep their thickness; stretchers lengthen, slats and spindles spread and keep their
-number and section; a leg's or a back's lean, as a distance, stays.  The family is disjoint from
-the shapes that encoders are trained on.
+The truth is a carpenter's: a wider chair has a wider seat, cushion, apron and rails, while legs,
+posts and arms move apart and keep their thickness; stretchers lengthen, slats and spindles spread
+and keep their number and section; a leg's or a back's lean, as a distance, stays.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from model_export.detailed.shape import DetailedShape, named
 from model_export.primitives import (
     Array,
     Faces,
@@ -40,46 +38,39 @@ ARM_SHORT = 0.05
 
 
 @dataclass(frozen=True)
-class DetailedChair:
-    """A chair that can be generated again with other parameters.
+class DetailedChair(DetailedShape):
+    """A chair; its origin is the centre of the seat."""
 
-    Attributes:
-        parameters: ``[8]`` metres, in the chair template's order.
-        faces: ``[F, 3]``, the same for all parameters.
-        welded: whether it is one connected piece.
-        nuisances: what the chair template needs besides to stand as this chair does.
-        arms: whether it has any.
+    @property
+    def arms(self) -> bool:
+        """Whether it has any."""
+        return self.variant == "armchair"
+
+
+def detailed_chair(seed: int, density: int | None = None) -> DetailedChair:
+    """The chair of a seed; every third is welded.
+
+    Args:
+        seed: of all that is drawn.
+        density: how finely it is cut, from 1 (1 000 to 3 000 vertices) to 10 (100 000); drawn from
+            2 to 4 by default.
     """
-
-    parameters: Array
-    faces: Faces
-    welded: bool
-    nuisances: dict[str, float]
-    arms: bool
-    _build: Callable[[SimpleNamespace], Mesh]
-
-    def mesh(self, f: ArrayLike) -> Array:
-        """Vertices ``[V, 3]`` in metres for ``f [8]``; the origin is the centre of the seat."""
-        return self._build(_named(f))[0]
-
-
-def detailed_chair(seed: int) -> DetailedChair:
-    """The chair of a seed; every third is welded."""
     rng = np.random.default_rng([2020, seed])
     low = [0.36, 0.018, 0.025, 0.38, 0.38, 0.30, 0.028, 0.028]
     high = [0.62, 0.050, 0.080, 0.52, 0.56, 0.50, 0.055, 0.055]
     parameters = rng.uniform(low, high)
     welded = seed % 3 == 2
     style = _style(rng)
+    style.density = density or style.density
     builder = _welded if welded else _assembled
 
     def build(p: SimpleNamespace) -> Mesh:
         return builder(p, style)
 
-    faces = build(_named(parameters))[1]
-    arms = bool(style.arms) and not welded
-    nuisances = _nuisances(_named(parameters), style, 0.0 if welded else style.inset)
-    return DetailedChair(parameters, faces, welded, nuisances, arms, build)
+    p = named(NAMES, parameters)
+    nuisances = _nuisances(p, style, 0.0 if welded else style.inset)
+    variant = "armchair" if style.arms and not welded else "chair"
+    return DetailedChair("chair", NAMES, parameters, build(p)[1], welded, nuisances, variant, build)
 
 
 def _nuisances(p: SimpleNamespace, s: SimpleNamespace, inset: float) -> dict[str, float]:
@@ -91,10 +82,6 @@ def _nuisances(p: SimpleNamespace, s: SimpleNamespace, inset: float) -> dict[str
         "arm_width": 2 * ARM_HALF[0], "arm_thickness": 2 * ARM_HALF[1],
         "arm_length": p.seat_depth - ARM_SHORT,
     }  # fmt: skip
-
-
-def _named(f: ArrayLike) -> SimpleNamespace:
-    return SimpleNamespace(**dict(zip(NAMES, np.asarray(f, np.float64), strict=True)))
 
 
 def _style(rng: np.random.Generator) -> SimpleNamespace:

@@ -56,3 +56,13 @@ def test_wider_means_farther_apart_not_thicker(seed):
     moved = (after - before)[foot]
     np.testing.assert_allclose(moved[:, 0], 0.05 * np.sign(before[foot, 0]), atol=1e-9)
     np.testing.assert_allclose(moved[:, 1:], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_density_is_how_finely_a_chair_is_cut(seed):
+    coarse, fine = detailed_chair(seed, density=1), detailed_chair(seed, density=10)
+    np.testing.assert_array_equal(coarse.parameters, fine.parameters)
+    assert len(coarse.mesh(coarse.parameters)) < 3_000
+    assert len(fine.mesh(fine.parameters)) > 50_000
+    extents = [np.ptp(chair.mesh(chair.parameters), axis=0) for chair in (coarse, fine)]
+    np.testing.assert_allclose(*extents, rtol=0.03)
