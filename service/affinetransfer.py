@@ -25,7 +25,9 @@ from service.transfer import (
 Array = NDArray[np.float64]
 
 
-def take(found: AffineInference, other: AffineInference, options: TransferOptions) -> Taken:
+def take(
+    found: AffineInference, other: AffineInference, options: TransferOptions, keep: str
+) -> Taken:
     """What an edit of a shape takes from another.
 
     Lengths are the target's own; with ``size=source`` times the ratio of the diagonals of the two
@@ -36,6 +38,7 @@ def take(found: AffineInference, other: AffineInference, options: TransferOption
         found: the source.
         other: the target.
         options: what to take; parameters and derived dimensions may be named.
+        keep: the point that is put where the target's is, if so.
 
     Raises:
         InvalidRequest: for an unknown name.
@@ -47,7 +50,10 @@ def take(found: AffineInference, other: AffineInference, options: TransferOption
     values = {name: theirs[name] * ratio for name in names}
     edits = set_to({name: value * scale for name, value in values.items()}, own)
     units = dict.fromkeys(names, found.unit)
-    return Taken(edits, values, units, scale, [*of_target(other.warnings), *warnings])
+    goal = None
+    if options.position == "target":
+        goal = _foothold(other, other.mesh.vertices, keep) * ratio
+    return Taken(edits, values, units, scale, goal, [*of_target(other.warnings), *warnings])
 
 
 def _wanted(
@@ -98,20 +104,11 @@ def _size(found: AffineInference) -> float:
     return float(np.linalg.norm(extents(found))) * found.unit_scale
 
 
-def place(moved: Moved, where: AffineInference, keep: str) -> Moved:
-    """The edited mesh where a shape stands: an edit leaves it where it was itself.
-
-    Args:
-        moved: the edit.
-        where: the source or the target.
-        keep: the point that is to be there.
-    """
+def place(moved: Moved, goal: Array | None, keep: str) -> Moved:
+    """The edited mesh with its kept point at a goal; without one where the edit has left it."""
     found = moved.found
     assert isinstance(found, AffineInference)
-    if where is found:
-        return moved
-    goal = _foothold(where, where.mesh.vertices, keep) * unit_ratio(found, where)
-    return shifted(moved, goal - _foothold(found, moved.vertices, keep))
+    return moved if goal is None else shifted(moved, goal - _foothold(found, moved.vertices, keep))
 
 
 def _foothold(found: AffineInference, vertices: Array, keep: str) -> Array:

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 SHAPE = NAMES[ANGLES:]
 
 
-def take(found: BodyInference, other: BodyInference, options: TransferOptions) -> Taken:
+def take(found: BodyInference, other: BodyInference, options: TransferOptions, keep: str) -> Taken:
     """What an edit of a body takes from another.
 
     Angles and coefficients are set to the target's.  Unless parameters are named, the stature takes
@@ -33,11 +33,13 @@ def take(found: BodyInference, other: BodyInference, options: TransferOptions) -
         found: the source.
         other: the target.
         options: what to take; parameters and the stature may be named.
+        keep: what is put where the target's is, if so.
 
     Raises:
         InvalidRequest: for an unknown name.
     """
-    theirs, own = _values(other, unit_ratio(found, other)), _values(found)
+    ratio = unit_ratio(found, other)
+    theirs, own = _values(other, ratio), _values(found)
     wanted = chosen((*NAMES, STATURE), options.parameters, found.model.name)
     scale, warnings = 1.0, of_target(other.warnings)
     if options.size == "source":
@@ -52,7 +54,10 @@ def take(found: BodyInference, other: BodyInference, options: TransferOptions) -
     values = {name: theirs[name] for name in wanted}
     lengths = {name: value * scale for name, value in values.items() if name == STATURE}
     units = {name: found.unit if name == STATURE else _UNITS[name] for name in wanted}
-    return Taken(set_to({**values, **lengths}, own), values, units, scale, warnings)
+    goal = None
+    if options.position == "target":
+        goal = _foothold(other, other.mesh.vertices, keep) * ratio
+    return Taken(set_to({**values, **lengths}, own), values, units, scale, goal, warnings)
 
 
 _UNITS = dict(zip(NAMES, PARAMETER_UNITS, strict=True))
@@ -86,20 +91,16 @@ def _missed(found: BodyInference, other: BodyInference, height: float) -> str:
     )
 
 
-def place(moved: Moved, where: BodyInference, keep: str) -> Moved:
-    """The edited mesh where a body stands.
+def place(moved: Moved, goal: Array | None, keep: str) -> Moved:
+    """The edited mesh with its kept point at a goal; without one where the source's was.
 
-    A change of the pose turns what hangs on the pelvis, and leaves that where it was.  A whole
-    pose brings its own height of the pelvis above the floor: kept is the floor itself.
-
-    Args:
-        moved: the edit.
-        where: the source or the target.
-        keep: ``floor`` or ``pelvis``.
+    An edit of the pose leaves the pelvis where it is.  A whole pose brings its own height of the
+    pelvis above the floor, so that with ``keep=floor`` it is the floor that stays.
     """
     found = moved.found
     assert isinstance(found, BodyInference)
-    goal = _foothold(where, where.mesh.vertices, keep) * unit_ratio(found, where)
+    if goal is None:
+        goal = _foothold(found, found.mesh.vertices, keep)
     return shifted(moved, goal - _foothold(found, moved.vertices, keep))
 
 

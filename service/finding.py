@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from functools import partial
 
 import numpy as np
@@ -94,6 +94,21 @@ def require_recognised(found: Inference, category: str) -> None:
             f"(score {found.best.score:.2f})",
             f"Send category={found.model.name} to edit it as one all the same.",
         )
+
+
+@contextmanager
+def inferred_as(
+    name: str,
+    upload: Upload,
+    models: Mapping[str, Model],
+    options: InferOptions,
+    known: Inferences | None,
+) -> Iterator[Inference]:
+    """As `inferred`, for one of several uploads, whose faults are told by its name."""
+    with ExitStack() as stack:
+        with blaming(name):
+            found = stack.enter_context(inferred(upload, models, options, known))
+        yield found
 
 
 @contextmanager

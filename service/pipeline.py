@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from service import affineedit, affinesliders, affinetransfer, bodyedit, bodysliders, bodytransfer
 from service.bodyinference import BodyInference
@@ -17,7 +19,7 @@ from service.encode.basemodel import Model
 from service.encode.bodymodel import BodyModel
 from service.encode.debugmodel import DebugModel
 from service.errors import InvalidRequest
-from service.finding import blaming, inferred, require_recognised
+from service.finding import inferred, inferred_as, require_recognised
 from service.inference import Inference
 from service.inferences import Inferences
 from service.requests import (
@@ -29,7 +31,9 @@ from service.requests import (
     Upload,
 )
 from service.skeleton import Skeleton
-from service.transfer import Taken, require_alike, require_transfer, told
+from service.transfer import Taken, require_pair, require_transfer, told
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -41,14 +45,14 @@ class _Kind:
         sliders: puts all edits of it into a GLB.
         template: puts all edits of what was fitted into one.
         take: what an edit takes from another.
-        place: puts the edited one where it, or the other, stands.
+        place: puts the edited one where it is to stand.
     """
 
     move: Callable[[Any, Mapping[str, Change], EditOptions, str, Mapping[str, Interval]], Moved]
     sliders: Callable[[Any, SliderOptions, str], bytes]
     template: Callable[[Any, SliderOptions, str], bytes]
-    take: Callable[[Any, Any, TransferOptions], Taken]
-    place: Callable[[Moved, Any, str], Moved]
+    take: Callable[[Any, Any, TransferOptions, str], Taken]
+    place: Callable[[Moved, Array | None, str], Moved]
 
 
 _AFFINE = _Kind(
@@ -142,21 +146,15 @@ def transfer(
     """
     _require_mode(transfer_options.mode)
     require_transfer(transfer_options)
-    with ExitStack() as stack:
-        with blaming("source"):
-            found = stack.enter_context(inferred(source, models, options, known))
-        with blaming("target"):
-            other = stack.enter_context(inferred(target, models, target_options, known))
-        require_alike(found, other)
-        with blaming("source"):
-            require_recognised(found, options.category)
-        with blaming("target"):
-            require_recognised(other, target_options.category)
-        kind, keep = _KINDS[found.model.kind], _anchor(found.model, transfer_options.keep)
-        taken = kind.take(found, other, transfer_options)
+    with inferred_as("source", source, models, options, known) as found:
+        keep, kind = _anchor(found.model, transfer_options.keep), _KINDS[found.model.kind]
+        with inferred_as("target", target, models, target_options, known) as other:
+            require_pair(found, other, options.category, target_options.category)
+            taken = kind.take(found, other, transfer_options, keep)
+        # One mesh at a time is bound and moved: the other is let go before.
+        del other
         moved = kind.move(found, taken.edits, transfer_options, keep, NONE)
-        where = other if transfer_options.position == "target" else found
-        moved = kind.place(moved, where, keep)
+        moved = kind.place(moved, taken.goal, keep)
         return told(write_edited(moved, transfer_options.format), taken, transfer_options)
 
 

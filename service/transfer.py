@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from service.edited import Edited, Moved
 from service.edits import Change
 from service.errors import InvalidRequest
+from service.finding import blaming, require_recognised
 from service.inference import Inference
 from service.requests import POSITIONS, SIZES, UNITS, TransferOptions
 
@@ -35,6 +36,8 @@ class Taken:
         values: what the target has, by name, in the source's units.
         units: of those values.
         scale: what lengths were multiplied by on the way.
+        goal: ``[3]`` where the kept point is to lie, canonical and in the source's reported unit;
+            None for where an edit leaves it.
         warnings: what the client should know of the target, and of the way.
     """
 
@@ -42,6 +45,7 @@ class Taken:
     values: dict[str, float]
     units: dict[str, str]
     scale: float
+    goal: Array | None
     warnings: Sequence[str]
 
 
@@ -77,8 +81,24 @@ def require_transfer(options: TransferOptions) -> None:
             )
 
 
-def require_alike(found: Inference, other: Inference) -> None:
-    """Raise `InvalidRequest` (``categories_differ``) unless both are of one category."""
+def require_pair(found: Inference, other: Inference, category: str, other_category: str) -> None:
+    """Raise `InvalidRequest` unless a source and a target can be taken for shapes of one category.
+
+    Args:
+        found, other: the source and the target.
+        category, other_category: what the client says of each.
+
+    Raises:
+        InvalidRequest: ``categories_differ`` or ``not_recognised``.
+    """
+    _require_alike(found, other)
+    with blaming("source"):
+        require_recognised(found, category)
+    with blaming("target"):
+        require_recognised(other, other_category)
+
+
+def _require_alike(found: Inference, other: Inference) -> None:
     one, two = found.model.name, other.model.name
     if one == two:
         return
