@@ -26,6 +26,7 @@ from service.api import (
     problems,
     scrape,
     sliders,
+    transfer,
     viewer,
 )
 from service.api.admission import Admission, Admit
@@ -109,7 +110,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Pieces)
     app.add_middleware(Linger)  # added last: outermost
     problems.install(app)
-    for noun in (infer, edit, sliders):
+    for noun in (infer, edit, sliders, transfer):
         app.include_router(noun.router, responses=problems.documented(401, 403))
     for noun in (categories, meshes):
         app.include_router(noun.router, responses=problems.documented(401))

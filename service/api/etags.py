@@ -1,6 +1,6 @@
 """Entity tags: what a client says that it holds, and what it would be sent.
 
-What is computed is tagged by what it is computed from: the content, name and type of the upload,
+What is computed is tagged by what it is computed from: the content, name and type of the uploads,
 the fields of the form, the `Accept` header, the models and the build of the service.  So a client
 that holds an answer is told so before anything is inferred, and a large result need not be hashed.
 
@@ -18,13 +18,13 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from pydantic import BaseModel
 from starlette.requests import Request
 from starlette.responses import Response
 
 from service.api.build import build
+from service.api.forms import MeshForm
 from service.encode.model import Model
 from service.requests import Upload
 
@@ -35,18 +35,18 @@ _TAG = re.compile(r'(?:W/)?"([\x21\x23-\x7e\x80-\xff]*)"')
 
 
 def validator(
-    request: Request, upload: Upload, form: BaseModel, models: Mapping[str, Model]
+    request: Request, uploads: Sequence[Upload], form: MeshForm, models: Mapping[str, Model]
 ) -> str:
     """What the answer to a form depends on, as 32 hex digits: the inside of a tag.
 
-    The first call with an upload hashes it: not for the event loop.
+    The first call with uploads hashes them: not for the event loop.
     """
     facts = [
         build(),
         request.url.path,
         request.headers.getlist("accept"),
-        [upload.mesh_id, upload.name, upload.content_type],
-        form.model_dump(mode="json", exclude={"mesh", "mesh_id"}),
+        [[upload.mesh_id, upload.name, upload.content_type] for upload in uploads],
+        form.model_dump(mode="json", exclude={*form.uploads, *form.uploads.values()}),
         {name: model.fingerprint for name, model in models.items()},
     ]
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:32]

@@ -8,6 +8,8 @@ from typing import Any
 
 from starlette.datastructures import UploadFile
 
+from service.api.keeping import PARTS
+
 Explanation = tuple[str, str, str]
 
 
@@ -43,11 +45,11 @@ def _explain(name: str, error: Mapping[str, Any]) -> Explanation:
     value = error.get("input")
     if error["type"] == "missing":
         return "field_missing", f"The form field {name!r} is missing.", f"Add -F {name}=..."
-    if name == "mesh":
+    if name in PARTS:
         return (
             "field_invalid",
-            "The part 'mesh' came as text, not as a file.",
-            "Send the file itself, with its name: curl -F mesh=@chair.glb (mind the @).",
+            f"The part {name!r} came as text, not as a file.",
+            f"Send the file itself, with its name: curl -F {name}=@chair.glb (mind the @).",
         )
     if isinstance(value, UploadFile):
         return (

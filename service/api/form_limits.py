@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-FIELDS = 32
+FIELDS = 40
 """Text fields of a form; the largest has half as many."""
 
 FILES = 2
-"""File parts: one is wanted, and two are told apart from a form that is out of bounds."""
+"""File parts: a transfer's; where one is wanted, two are told apart from a form that is out of
+bounds."""
 
 FIELD_BYTES = 256 * 1024
 """Length of a text field, its name included where the form is URL-encoded."""
@@ -17,7 +18,8 @@ _OVERRUNS: dict[str, tuple[int, str, str]] = {
     "Too many files": (
         400,
         "files_too_many",
-        "Send one file, as the part `mesh`; what belongs to it goes with it in a zip.",
+        "Send one file, as the part `mesh`, or the `source` and the `target` of a transfer; what "
+        "belongs to a mesh goes with it in a zip.",
     ),
     "Part exceeded": (413, "field_too_large", "Send the mesh as a file: -F mesh=@chair.glb."),
     "Field exceeded": (

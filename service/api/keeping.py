@@ -8,6 +8,8 @@ from service.requests import Upload
 from service.store.meshstore import Kept, MeshStore
 
 UPLOADED, EDITED = "The uploaded mesh", "The edited mesh"
+PARTS = {"mesh": UPLOADED, "source": "The source mesh", "target": "The target mesh"}
+"""What a form's files are called."""
 
 _WARNINGS = {
     Kept.HERE: "is kept by one server alone for now: others may not know its mesh_id.",

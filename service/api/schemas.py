@@ -32,6 +32,14 @@ MESH_HEADERS: dict[str, Any] = {
     },
 }
 
+EDITED_HEADERS: dict[str, Any] = {
+    **MESH_HEADERS,
+    "Shape-Parameters": {
+        "description": "JSON: the parameters' values after the edit.",
+        "schema": {"type": "string", "contentMediaType": "application/json"},
+    },
+}
+
 
 class Schema(BaseModel):
     """Base of all answers.  They may gain fields; clients should pass over what they don't know."""
@@ -184,6 +192,27 @@ class EditReport(Schema):
     flipped_faces: int
     """Faces that the edit turned over."""
     warnings: list[str]
+
+
+class Transfer(Schema):
+    """What an edit took from another mesh."""
+
+    parameters: list[str] = Field(examples=[["seat_width", "leg_height"]])
+    """What was set in the source."""
+    size: Literal["target", "source"]
+    position: Literal["source", "target"]
+    scale: float
+    """What the target's lengths were multiplied by: 1 but with `size=source`."""
+    target: dict[str, Measure] = Field(examples=[{"seat_width": {"value": 0.5, "unit": "m"}}])
+    """What the target has, in the source's units."""
+
+
+class TransferReport(EditReport):
+    """What `POST /transfer` answers to `Accept: application/json`."""
+
+    target_mesh_id: str = Field(examples=["sha256-51de..."])
+    """Of the mesh that the parameters were taken from."""
+    transfer: Transfer
 
 
 class Parameter(Schema):

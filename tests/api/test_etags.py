@@ -55,10 +55,13 @@ def test_tags_are_compared_weakly(header: str | None, held: bool, tag: str) -> N
     assert etags.held(asking(header), tag) is held
 
 
+UPLOAD = Upload(b"abc", "a.obj", "model/obj")
+
+
 def validator(**changed: Any) -> str:
     given = {
         "request": asking(),
-        "upload": Upload(b"abc", "a.obj", "model/obj"),
+        "uploads": (UPLOAD,),
         "form": InferForm(),
         "models": {"stool": Stool()},
         **changed,
@@ -71,9 +74,10 @@ def validator(**changed: Any) -> str:
     [
         {"request": asking(path="/edit")},
         {"request": asking(accept="application/json")},
-        {"upload": Upload(b"abd", "a.obj", "model/obj")},
-        {"upload": Upload(b"abc", "b.obj", "model/obj")},
-        {"upload": Upload(b"abc", "a.obj", None)},
+        {"uploads": (Upload(b"abd", "a.obj", "model/obj"),)},
+        {"uploads": (Upload(b"abc", "b.obj", "model/obj"),)},
+        {"uploads": (Upload(b"abc", "a.obj", None),)},
+        {"uploads": (UPLOAD, UPLOAD)},
         {"form": InferForm(units="cm")},
         {"form": InferForm(refine=False)},
         {"form": EditForm(edits="{}")},
