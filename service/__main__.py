@@ -19,14 +19,14 @@ from service.settings import Settings
 from service.store.fault import StoreFault
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Serve until SIGTERM or SIGINT.
+def main(arguments: Sequence[str] | None = None, program: str = "python -m service") -> int:
+    """Serve until SIGTERM or SIGINT, as the ``program`` of that name.
 
     The exit status is 0 when all requests were answered before the end, else 1; 1 when the port
     can't be had, and 2 when a setting makes no sense.
     """
     malloc.settle()
-    parser = argparse.ArgumentParser(prog="python -m service", description=__doc__)
+    parser = argparse.ArgumentParser(prog=program, description=__doc__)
     parser.add_argument("--host", help="address to listen on (HOST, 127.0.0.1)")
     parser.add_argument("--port", help="port to listen on (PORT, 8000)")
     given = {name: value for name, value in vars(parser.parse_args(arguments)).items() if value}

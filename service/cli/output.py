@@ -1,0 +1,130 @@
+"""What a command says: tables for people, JSON for programs, and what went wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TextIO
+
+import click
+
+from service.cli.problem import CLOSED, Problem
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+PIPED_COLUMNS = 160
+"""Width of tables that go to no terminal: wide enough that nothing is cut off."""
+
+
+@dataclass
+class Output:
+    """Where a command speaks.
+
+    Attributes:
+        as_json: one JSON document a line on standard output, and nothing else there.
+        quiet: nothing but problems.
+        aside: tables go to standard error, since a mesh goes to standard output.
+        several: whether there are several files, so that each is named.
+    """
+
+    as_json: bool = False
+    quiet: bool = False
+    aside: bool = False
+    several: bool = False
+    _failed: list[str] = field(default_factory=list)
+    _code: int = 0
+
+    @cached_property
+    def console(self) -> Console:
+        """For people."""
+        return console(sys.stderr if self.aside else sys.stdout)
+
+    @cached_property
+    def errors(self) -> Console:
+        """For problems."""
+        return console(sys.stderr)
+
+    @property
+    def talks(self) -> bool:
+        """Whether people are to be told things."""
+        return not (self.as_json or self.quiet)
+
+    def show(self, *what: RenderableType) -> None:
+        """Tell people."""
+        if self.talks:
+            with closing_quietly():
+                for item in what:
+                    self.console.print(item, soft_wrap=isinstance(item, str))
+                self.console.file.flush()
+
+    def titled(self, file: str, what: Iterable[RenderableType]) -> None:
+        """Tell people of a file, under its name where there are several."""
+        if self.several:
+            self.show(f"\n{file}")
+        self.show(*what)
+
+    def document(self, document: Mapping[str, Any]) -> None:
+        """Tell programs."""
+        if self.as_json:
+            with closing_quietly():
+                click.echo(json.dumps(document, allow_nan=False))
+
+    def mesh(self, data: bytes) -> None:
+        """Pass a mesh on."""
+        with closing_quietly():
+            sys.stdout.buffer.write(data)
+            sys.stdout.buffer.flush()
+
+    def failed(self, problem: Problem, file: str | None = None) -> None:
+        """Tell what went wrong, and remember it for `finish`."""
+        from rich.text import Text
+
+        self._failed.append(file or "")
+        self._code = max(self._code, problem.exit_code)
+        if self.as_json:
+            self.document(({} if file is None else {"file": file}) | problem.document())
+            return
+        said = Text("Error: ", style="bold red")
+        said.append(f"{file}: " if file else "", style="not bold default")
+        said.append(problem.code, style="bold default")
+        said.append(f"\n  {problem.detail}\n  {problem.suggestion}", style="not bold default")
+        if trace := problem.members.get("trace_id"):
+            said.append(f"\n  (trace_id {trace})", style="not bold dim")
+        self.errors.print(said, soft_wrap=True)
+
+    def finish(self, count: int = 1) -> None:
+        """End the command, with the exit code that its problems call for.
+
+        Args:
+            count: how many files there were.
+        """
+        if self._failed and count > 1 and not self.as_json:
+            files = ", ".join(self._failed)
+            click.echo(f"{len(self._failed)} of {count} files failed: {files}", err=True)
+        if self._code:
+            raise click.exceptions.Exit(self._code)
+
+
+def console(file: TextIO) -> Console:
+    """A console on a stream: as wide as the terminal, or wide enough where there is none."""
+    from rich.console import Console
+
+    width = None if file.isatty() or "COLUMNS" in os.environ else PIPED_COLUMNS
+    return Console(file=file, width=width, highlight=False, emoji=False, markup=False)
+
+
+@contextmanager
+def closing_quietly() -> Iterator[None]:
+    """Whoever reads the output may have enough of it: then the command ends without a word."""
+    try:
+        yield
+    except BrokenPipeError:
+        # What is still to be flushed when Python ends goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise click.exceptions.Exit(CLOSED) from None

@@ -1,0 +1,49 @@
+"""Completion in shells: click's own scripts, but that no space follows ``seat_width=``."""
+
+from __future__ import annotations
+
+from click.shell_completion import (
+    BashComplete,
+    FishComplete,
+    ShellComplete,
+    ZshComplete,
+    add_completion_class,
+)
+
+VARIABLE = "_SHAPE_EDIT_COMPLETE"
+"""Set while a shell asks; click goes by the program's name."""
+
+
+class _Bash(BashComplete):
+    """A value is still to be typed behind ``seat_width=``."""
+
+    source_template = BashComplete.source_template.replace(
+        "    return 0", "    [[ ${COMPREPLY[0]} == *= ]] && compopt -o nospace\n\n    return 0"
+    )
+
+    @staticmethod
+    def _check_version() -> None:
+        """No bash is asked for its version: the script may be for another machine."""
+
+
+class _Zsh(ZshComplete):
+    """Likewise."""
+
+    source_template = ZshComplete.source_template.replace(
+        "compadd -U -V unsorted -a completions",
+        "compadd -U -V unsorted -S '' -q -a completions",
+    )
+
+
+SHELLS = ("bash", "zsh", "fish")
+_CLASSES: dict[str, type[ShellComplete]] = {"bash": _Bash, "zsh": _Zsh, "fish": FishComplete}
+
+for _class in (_Bash, _Zsh):
+    add_completion_class(_class)
+
+
+def script(shell: str) -> str:
+    """What the shell is to evaluate."""
+    from service.cli.main import PROGRAM, cli
+
+    return _CLASSES[shell](cli, {}, PROGRAM, VARIABLE).source()
