@@ -6,7 +6,15 @@ said in `chairs` and `airplanes`.  The families are disjoint from the shapes tha
 trained on.
 """
 
+from model_export.detailed.airplanes import AIRPLANE_NAMES, detailed_airplane
 from model_export.detailed.chairs import NAMES, DetailedChair, detailed_chair
 from model_export.detailed.shape import DetailedShape
 
-__all__ = ["NAMES", "DetailedChair", "DetailedShape", "detailed_chair"]
+__all__ = [
+    "AIRPLANE_NAMES",
+    "NAMES",
+    "DetailedChair",
+    "DetailedShape",
+    "detailed_airplane",
+    "detailed_chair",
+]
