@@ -47,8 +47,8 @@ def detailed_airplane(seed: int, density: int | None = None) -> DetailedShape:
 
     Args:
         seed: of all that is drawn.
-        density: how finely it is cut, from 1 (600 to 4 000 vertices) to 12 (60 000 to 150 000); drawn from 2 to
-            4 by default.
+        density: how finely it is cut, from 1 (600 to 4 000 vertices) to 12 (60 000 to 150 000);
+            drawn from 2 to 4 by default.
     """
     rng = np.random.default_rng([2021, seed])
     length = np.exp(rng.uniform(np.log(7.0), np.log(45.0)))
