@@ -113,12 +113,26 @@ def edit(
     Raises:
         ShapeError: as `infer`, and for an edit that can't be made, or constraints that conflict.
     """
-    _require_mode(edit_options.mode)
+    require_mode(edit_options.mode)
     with inferred(upload, models, options, known) as found:
         require_recognised(found, options.category)
-        keep = _anchor(found.model, edit_options.keep)
-        moved = _KINDS[found.model.kind].move(found, edits, edit_options, keep, constraints)
-        return write_edited(moved, edit_options.format)
+        return write_edited(move(found, edits, edit_options, constraints), edit_options.format)
+
+
+def move(
+    found: Inference,
+    edits: Mapping[str, Change],
+    edit_options: EditOptions,
+    constraints: Mapping[str, Interval] = NONE,
+) -> Moved:
+    """Carry out an edit of what is known of an upload: for callers that make several of one.
+
+    Raises:
+        ShapeError: as `edit`, but for what is wrong with the upload.
+    """
+    require_mode(edit_options.mode)
+    keep = _anchor(found.model, edit_options.keep)
+    return _KINDS[found.model.kind].move(found, edits, edit_options, keep, constraints)
 
 
 def transfer(
@@ -144,7 +158,7 @@ def transfer(
         ShapeError: as `edit`; details begin with ``source:`` or ``target:`` where one of the two
             is at fault.  ``categories_differ`` for shapes of two categories.
     """
-    _require_mode(transfer_options.mode)
+    require_mode(transfer_options.mode)
     require_transfer(transfer_options)
     with inferred_as("source", source, models, options, known) as found:
         keep, kind = _anchor(found.model, transfer_options.keep), _KINDS[found.model.kind]
@@ -215,7 +229,8 @@ def skeleton(
         return Skeleton.of(found)
 
 
-def _require_mode(mode: str) -> None:
+def require_mode(mode: str) -> None:
+    """Raise `InvalidRequest` (``unknown_mode``) unless ``mode`` is one of `MODES`."""
     if mode not in MODES:
         raise InvalidRequest(
             "unknown_mode", f"mode={mode[:40]!r} is no mode", f"Use {' or '.join(MODES)}."
