@@ -29,7 +29,8 @@ class Panel:
 
     Attributes:
         title: written above it.
-        meshes: vertices, faces, colour and opacity of each mesh, all in one canonical frame.
+        meshes: vertices, faces, colour and opacity of each mesh, all in one canonical frame; none
+            leave its place empty.
     """
 
     title: str
@@ -103,7 +104,8 @@ def save_sheet(
     )
     for axes in grid.flat:
         axes.axis("off")
-    drawn = list(zip(grid.flat, panels, strict=False))
+    places = zip(grid.flat, panels, strict=False)
+    drawn = [(axes, panel) for axes, panel in places if panel.meshes]
     for axes, panel in drawn:
         draw(axes, panel, view() if camera is None else camera)
     if same_scale:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
+from service.absent import idle, negligible
 from service.affineinference import AffineInference
 from service.edited import Moved
 from service.requests import TransferOptions
@@ -75,22 +77,20 @@ def _public(template: AffineTemplate) -> list[str]:
 def _moving(
     names: Sequence[str], found: AffineInference, other: AffineInference
 ) -> tuple[list[str], list[str]]:
-    """Those of the names that move something in both variants, and a warning of the others."""
-    idle = {name for shape in (found, other) for name in _idle(shape.fit.template)}
-    warnings = []
+    """Those of the names that mean something in both shapes, and a warning of the others."""
+    left_out, warnings = set[str](), []
     for whose, shape in (("source", found), ("target", other)):
-        still = [name for name in names if name in _idle(shape.fit.template)]
-        if still:
-            warnings.append(
-                f"{', '.join(still)} {'is' if len(still) == 1 else 'are'} left out: the {whose} is "
-                f"a {shape.fit.template.variant.replace('_', ' ')}, which has nothing of the kind"
-            )
-    return [name for name in names if name not in idle], warnings
-
-
-def _idle(template: AffineTemplate) -> list[str]:
-    """Parameters that move nothing in a variant."""
-    return [name for name, moves in zip(template.names, template.active, strict=True) if not moves]
+        template = shape.fit.template
+        variant = template.variant.replace("_", " ")
+        for among, why in (
+            (idle(template), f"is a {variant}, in which nothing moves by that"),
+            (negligible(template, shape.parameters), "has next to nothing of the kind"),
+        ):
+            if still := [name for name in compress(template.names, among) if name in names]:
+                left_out.update(still)
+                told = f"{', '.join(still)} {'is' if len(still) == 1 else 'are'} left out"
+                warnings.append(f"{told}: the {whose} {why}")
+    return [name for name in names if name not in left_out], warnings
 
 
 def _values(found: AffineInference) -> dict[str, float]:

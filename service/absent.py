@@ -1,0 +1,64 @@
+"""What a rigid shape has nothing of, or next to nothing: the back of a stool."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.template.affine import AffineTemplate
+
+Array = NDArray[np.float64]
+Which = NDArray[np.bool_]
+
+MAIN = 0.5
+"""Main sizes are typically at least this share of the largest of them: a part without its main size
+is not there, one without a thickness is a thin part."""
+NEGLIGIBLE = 0.1
+"""A size is next to none below this share of the least that is typical, for a shape of that size.
+Fitted backs of real stools have up to 0.06 of it, the smallest main sizes of real chairs 0.16."""
+
+
+def idle(template: AffineTemplate) -> Which:
+    """``[d]`` the parameters that users see and that move nothing in a variant of a template."""
+    return template.public & ~template.active
+
+
+def negligible(template: AffineTemplate, lengths: Array) -> Which:
+    """The parameters that say next to nothing of a shape.
+
+    Where a main size is next to none, the parts that it moves are not there: the other parameters
+    that move these alone are of nothing, whatever was fitted.
+
+    Args:
+        template: the variant that was fitted.
+        lengths: ``[d]`` its parameters, in any unit.
+
+    Returns:
+        ``[d]``, false for those that move nothing at all and for those that users don't see.
+    """
+    low, high = np.array([parameter.typical for parameter in template.parameters]).T
+    sizes = template.public & template.active & (low > 0.0)
+    middle = np.sqrt(np.where(sizes, low * high, 1.0))
+    # The median is of the shape, whatever one of its sizes is; large ones tell more.
+    ratio = _median(lengths[sizes] / middle[sizes], middle[sizes])
+    main = sizes & (low >= MAIN * np.max(low[sizes], initial=0.0))
+    moves: Which = _moved_parts(template)
+    none = main & (lengths < NEGLIGIBLE * ratio * low) & ~moves.all(axis=1)
+    within: Which = ~np.any(moves[:, None] & ~moves[None], axis=2)
+    return np.asarray(template.public & template.active & np.any(within[:, none], axis=1))
+
+
+def _median(values: Array, weights: Array) -> float:
+    """The weighted median; 0 of nothing."""
+    if not len(values):
+        return 0.0
+    order = np.argsort(values)
+    below = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(below, 0.5 * below[-1])])
+
+
+def _moved_parts(template: AffineTemplate) -> Which:
+    """``[d, P]`` whether each parameter moves anything of each part."""
+    moves = np.asarray(template.jacobian.any(axis=1))
+    parts = [moves[template.part == part].any(axis=0) for part in range(len(template.parts))]
+    return np.stack(parts, axis=1)
