@@ -86,7 +86,14 @@ class Destination:
         Raises:
             Problem: when something is there, and may not be replaced.
         """
-        path = self._path(file, name, suffix)
+        return self._taking(self._path(file, name, suffix))
+
+    def within(self, name: str) -> Path:
+        """Where a file of that name goes in the folder, likewise."""
+        assert self.out is not None
+        return self._taking(Path(self.out) / name)
+
+    def _taking(self, path: Path) -> Path:
         self._require_free(path)
         self._taken.add(path.resolve())
         return path
@@ -123,7 +130,7 @@ def write(path: Path, data: bytes) -> None:
     """
     path = path.resolve()
     try:
-        path.parent.mkdir(exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists() and not path.is_file():
             path.write_bytes(data)  # a device or a pipe
             return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from io import TextIOWrapper
 
 import click
 
@@ -64,6 +65,9 @@ for command in (infer, edit, sliders, template, transfer, categories, serve, com
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and answer the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal may lack a character of a table
     try:
         code = cli.main(
             None if arguments is None else list(arguments), PROGRAM, standalone_mode=False

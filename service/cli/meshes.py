@@ -6,6 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from service.cli.neighbours import gathered
 from service.cli.problem import Problem, reason
 
 PIPE = "-"
@@ -19,18 +20,21 @@ class Mesh:
     Attributes:
         data: its bytes.
         name: what it is called, where that is known: the suffix tells the format.
+        gathered: whether it is a zip of a file and of those that lay beside it.
     """
 
     data: bytes
     name: str | None
+    gathered: bool = False
 
 
-def read(file: str, name: str | None = None) -> Mesh:
-    """A file, or what comes from standard input for ``-``.
+def read(file: str, name: str | None = None, looks: bool = False) -> Mesh:
+    """A file with what it needs of those beside it, or what comes from standard input for ``-``.
 
     Args:
         file: its path, or ``-``.
-        name: to be called by instead.
+        name: of what comes from standard input.
+        looks: also gather materials and pictures that only the looks need.
 
     Raises:
         Problem: when it can't be read.
@@ -45,7 +49,11 @@ def read(file: str, name: str | None = None) -> Mesh:
         return Mesh(sys.stdin.buffer.read(), name)
     path = Path(file)
     try:
-        return Mesh(path.read_bytes(), name or path.name)
+        data = path.read_bytes()
+        together = gathered(path, data, looks)
+        if together is not None:
+            return Mesh(together, f"{path.stem}.zip", gathered=True)
+        return Mesh(data, path.name)
     except FileNotFoundError:
         raise Problem(
             "file_missing", f"There is no file {file!r}.", "Check the path, or list the folder."

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,9 +17,6 @@ from service.cli.problem import CLOSED, Problem
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
-
-PIPED_COLUMNS = 160
-"""Width of tables that go to no terminal: wide enough that nothing is cut off."""
 
 
 @dataclass
@@ -43,12 +40,16 @@ class Output:
     @cached_property
     def console(self) -> Console:
         """For people."""
-        return console(sys.stderr if self.aside else sys.stdout)
+        from service.cli.consoles import PlainConsole
+
+        return PlainConsole(sys.stderr if self.aside else sys.stdout)
 
     @cached_property
     def errors(self) -> Console:
         """For problems."""
-        return console(sys.stderr)
+        from service.cli.consoles import PlainConsole
+
+        return PlainConsole(sys.stderr)
 
     @property
     def talks(self) -> bool:
@@ -58,9 +59,11 @@ class Output:
     def show(self, *what: RenderableType) -> None:
         """Tell people."""
         if self.talks:
+            from rich.text import Text
+
             with closing_quietly():
                 for item in what:
-                    self.console.print(item, soft_wrap=isinstance(item, str))
+                    self.console.print(item, soft_wrap=isinstance(item, str | Text))
                 self.console.file.flush()
 
     def titled(self, file: str, what: Iterable[RenderableType]) -> None:
@@ -109,14 +112,6 @@ class Output:
             click.echo(f"{len(self._failed)} of {count} files failed: {files}", err=True)
         if self._code:
             raise click.exceptions.Exit(self._code)
-
-
-def console(file: TextIO) -> Console:
-    """A console on a stream: as wide as the terminal, or wide enough where there is none."""
-    from rich.console import Console
-
-    width = None if file.isatty() or "COLUMNS" in os.environ else PIPED_COLUMNS
-    return Console(file=file, width=width, highlight=False, emoji=False, markup=False)
 
 
 @contextmanager

@@ -27,11 +27,26 @@ class _Bash(BashComplete):
 
 
 class _Zsh(ZshComplete):
-    """Likewise."""
+    """Likewise; such names come with their labels, and are shown apart."""
 
-    source_template = ZshComplete.source_template.replace(
-        "compadd -U -V unsorted -a completions",
-        "compadd -U -V unsorted -S '' -q -a completions",
+    source_template = (
+        ZshComplete.source_template.replace(
+            "    local -a completions_with_descriptions\n",
+            "    local -a completions_with_descriptions\n    local -a names\n",
+        )
+        .replace(
+            'if [[ "$descr" == "_" ]]; then',
+            'if [[ "$key" == *= ]]; then\n'
+            '                names+=("$key":"$descr")\n'
+            '            elif [[ "$descr" == "_" ]]; then',
+        )
+        .replace(
+            '    if [ -n "$completions" ]; then',
+            '    if [ -n "$names" ]; then\n'
+            "        _describe -V unsorted names -U -S ''\n"
+            "    fi\n\n"
+            '    if [ -n "$completions" ]; then',
+        )
     )
 
 

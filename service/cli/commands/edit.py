@@ -22,7 +22,7 @@ from service.cli.options import (
 )
 from service.cli.output import Output
 from service.cli.problem import Problem
-from service.cli.results import deliver
+from service.cli.results import deliver, prepared
 from service.cli.run import each
 from service.cli.shapes import Made, Shapes
 
@@ -78,17 +78,15 @@ def edit(
     if not dry_run:
         place.require_sense(files, as_json)
     how = picked(given, HOW)
-    how["format"] = how["format"] or place.format
     aside = not dry_run and any(place.piped(file) for file in files)
     output = Output(as_json, quiet, aside, len(files) > 1)
     shapes = Where(url, api_key).shapes()
 
     def work(file: str) -> None:
         mesh = read(file, name)
-        if not dry_run:
-            place.require_room(file, mesh.name, how["format"])
-        made = edited(shapes, mesh, reading, wishes, how)
-        deliver(made, mesh, file, None if dry_run else place, output)
+        goal = None if dry_run else place
+        made = edited(shapes, mesh, reading, wishes, prepared(mesh, file, goal, how))
+        deliver(made, mesh, file, goal, output)
 
     each(files, work, output)
 

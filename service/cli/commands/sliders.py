@@ -88,7 +88,7 @@ def _make(
     output = Output(as_json, quiet, any(place.piped(file) for file in files), len(files) > 1)
 
     def work(file: str) -> None:
-        mesh = read(file, name)
+        mesh = read(file, name, looks=True)
         place.require_room(file, mesh.name, FORMAT)
         data = make(mesh, reading, given)
         if place.piped(file):

@@ -22,7 +22,7 @@ from service.cli.options import (
 )
 from service.cli.output import Output
 from service.cli.quantities import METRES
-from service.cli.results import deliver
+from service.cli.results import deliver, prepared
 from service.cli.run import each
 
 HOW = ("keep", "mode", "format", "strict", "parameters", "size", "position")
@@ -86,15 +86,14 @@ def transfer(
     if not dry_run:
         place.require_sense((source,), as_json)
     how = picked(given, HOW)
-    how["format"] = how["format"] or place.format
     output = Output(as_json, quiet, not dry_run and place.piped(source))
     shapes = Where(url, api_key).shapes()
 
     def work(file: str) -> None:
-        mesh, other = (read(one, name if one == PIPE else None) for one in (file, target))
-        if not dry_run:
-            place.require_room(file, mesh.name, how["format"])
-        made = shapes.transfer(mesh, other, reading, {**reading, **beside}, how)
-        deliver(made, mesh, file, None if dry_run else place, output)
+        mesh, other = (read(one, name) for one in (file, target))
+        goal = None if dry_run else place
+        manner = prepared(mesh, file, goal, how)
+        made = shapes.transfer(mesh, other, reading, {**reading, **beside}, manner)
+        deliver(made, mesh, file, goal, output)
 
     each([source], work, output)
