@@ -1,4 +1,5 @@
-"""What a rigid shape has nothing of, or next to nothing: the back of a stool."""
+"""What a rigid shape has nothing of, or next to nothing, or of other parts than another has: the
+back of a stool, the legs of a pedestal."""
 
 from __future__ import annotations
 
@@ -46,6 +47,30 @@ def negligible(template: AffineTemplate, lengths: Array) -> Which:
     none = main & (lengths < NEGLIGIBLE * ratio * low) & ~moves.all(axis=1)
     within: Which = ~np.any(moves[:, None] & ~moves[None], axis=2)
     return np.asarray(template.public & template.active & np.any(within[:, none], axis=1))
+
+
+def differing(template: AffineTemplate, other: AffineTemplate) -> Which:
+    """``[d]`` the parameters that are sizes of other parts in one variant than in the other.
+
+    A column is thicker than legs are, and says nothing of them.  Sizes of the whole, which derived
+    dimensions go by, mean the same whatever parts they are of.
+    """
+    one, two = _sized_parts(template), _sized_parts(other)
+    common = np.array([bool(mine & theirs) for mine, theirs in zip(one, two, strict=True)])
+    whole = np.zeros(len(template.parameters), bool)
+    for dimension in template.derived.values():
+        whole[list(dimension.by)] = True
+    return np.asarray(template.active & other.active & template.public & ~common & ~whole)
+
+
+def _sized_parts(template: AffineTemplate) -> list[set[str]]:
+    """Names of the parts that each parameter does more to than move them as a whole."""
+    sized: list[set[str]] = [set() for _ in template.parameters]
+    for index, name in enumerate(template.parts):
+        rows = template.jacobian[template.part == index]
+        for parameter in np.flatnonzero(np.ptp(rows, axis=0).any(axis=0)):
+            sized[parameter].add(name)
+    return sized
 
 
 def _median(values: Array, weights: Array) -> float:

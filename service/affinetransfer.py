@@ -8,7 +8,7 @@ from itertools import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from service.absent import idle, negligible
+from service.absent import differing, idle, negligible
 from service.affineinference import AffineInference
 from service.edited import Moved
 from service.requests import TransferOptions
@@ -78,19 +78,25 @@ def _moving(
     names: Sequence[str], found: AffineInference, other: AffineInference
 ) -> tuple[list[str], list[str]]:
     """Those of the names that mean something in both shapes, and a warning of the others."""
-    left_out, warnings = set[str](), []
-    for whose, shape in (("source", found), ("target", other)):
-        template = shape.fit.template
-        variant = template.variant.replace("_", " ")
-        for among, why in (
-            (idle(template), f"is a {variant}, in which nothing moves by that"),
-            (negligible(template, shape.parameters), "has next to nothing of the kind"),
-        ):
-            if still := [name for name in compress(template.names, among) if name in names]:
-                left_out.update(still)
-                told = f"{', '.join(still)} {'is' if len(still) == 1 else 'are'} left out"
-                warnings.append(f"{told}: the {whose} {why}")
-    return [name for name in names if name not in left_out], warnings
+    one, two = found.fit.template, other.fit.template
+    variants = [template.variant.replace("_", " ") for template in (one, two)]
+    reasons = [
+        (one, idle(one), f"the source is a {variants[0]}, in which nothing moves by that"),
+        (two, idle(two), f"the target is a {variants[1]}, in which nothing moves by that"),
+        (one, negligible(one, found.parameters), "the source has next to nothing of the kind"),
+        (two, negligible(two, other.parameters), "the target has next to nothing of the kind"),
+    ]
+    # Two versions of a model may have other parameters.
+    if one.names == two.names:
+        why = f"in a {variants[0]} and a {variants[1]} they are of other parts"
+        reasons.append((one, differing(one, two), why))
+    left, warnings = list(names), []
+    for template, among, why in reasons:
+        if still := [name for name in compress(template.names, among) if name in left]:
+            left = [name for name in left if name not in still]
+            verb = "is" if len(still) == 1 else "are"
+            warnings.append(f"{', '.join(still)} {verb} left out: {why}")
+    return left, warnings
 
 
 def _values(found: AffineInference) -> dict[str, float]:
