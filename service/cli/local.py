@@ -141,14 +141,14 @@ class Local:
         shipped = partial(load_models, SHIPPED, THREADS, settings.body_model, names)
         own = settings.models_dir, THREADS, settings.body_model, defaults
         installed = Catalog(shipped, *own).load()
+        for fault in installed.faults:
+            click.echo(f"Warning: {fault.detail}. {fault.suggestion}", err=True)
         if not installed.models:
             raise NotFound(
                 "no_models",
                 "No model is installed.",
                 "Name categories that come along in CATEGORIES, or a folder in MODELS_DIR.",
             )
-        for fault in installed.faults:
-            click.echo(f"Warning: {fault.detail}. {fault.suggestion}", err=True)
         return installed
 
 
