@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -55,6 +55,22 @@ class Output:
     def talks(self) -> bool:
         """Whether people are to be told things."""
         return not (self.as_json or self.quiet)
+
+    @contextmanager
+    def busy(self, what: str) -> Iterator[Callable[[str], None]]:
+        """Show on a terminal that something is being worked on, until the block ends.
+
+        Args:
+            what: a file, say.
+
+        Yields:
+            a function to show how far it is.
+        """
+        if self.quiet or not sys.stderr.isatty():
+            yield lambda _: None
+            return
+        with self.errors.status(what) as status:
+            yield lambda far: status.update(f"{what}  {far}")
 
     def show(self, *what: RenderableType) -> None:
         """Tell people."""

@@ -99,3 +99,17 @@ def test_help_and_completion_load_no_models() -> None:
     assert "seat_top_height=45cm" in done.stdout
     slow = {"numpy", "scipy", "onnxruntime", "pydantic", "fastapi", "httpx", "rich", "yaml"}
     assert slow.isdisjoint(done.stderr.split())
+
+
+def test_a_terminal_sees_what_is_worked_on_and_standard_output_does_not(box_glb: Path) -> None:
+    master, slave = os.openpty()
+    environment = {**os.environ, "TERM": "xterm"}
+    line = [*LINE, "--json", str(box_glb)]
+    done = subprocess.run(
+        line, stdout=subprocess.PIPE, stderr=slave, env=environment, timeout=120, check=True
+    )
+    os.close(slave)
+    seen = os.read(master, 65536).decode()
+    os.close(master)
+    assert json.loads(done.stdout)["category"] == "debug"
+    assert box_glb.name in "".join(seen.split())

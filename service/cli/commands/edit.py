@@ -85,7 +85,9 @@ def edit(
     def work(file: str) -> None:
         mesh = read(file, name)
         goal = None if dry_run else place
-        made = edited(shapes, mesh, reading, wishes, prepared(mesh, file, goal, how))
+        manner = prepared(mesh, file, goal, how)
+        with output.busy(file):
+            made = edited(shapes, mesh, reading, wishes, manner)
         deliver(made, mesh, file, goal, output)
 
     each(files, work, output)

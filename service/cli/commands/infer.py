@@ -46,7 +46,9 @@ def infer(
     output = Output(as_json, quiet, several=len(files) > 1)
 
     def work(file: str) -> None:
-        report = shapes.infer(read(file, name), reading)
+        mesh = read(file, name)
+        with output.busy(file):
+            report = shapes.infer(mesh, reading)
         output.document({"file": file, **report})
         if output.talks:
             from service.cli import tables

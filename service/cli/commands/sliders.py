@@ -90,7 +90,8 @@ def _make(
     def work(file: str) -> None:
         mesh = read(file, name, looks=True)
         place.require_room(file, mesh.name, FORMAT)
-        data = make(mesh, reading, given)
+        with output.busy(file):
+            data = make(mesh, reading, given)
         if place.piped(file):
             output.mesh(data)
             return

@@ -93,7 +93,8 @@ def transfer(
         mesh, other = (read(one, name) for one in (file, target))
         goal = None if dry_run else place
         manner = prepared(mesh, file, goal, how)
-        made = shapes.transfer(mesh, other, reading, {**reading, **beside}, manner)
+        with output.busy(file):
+            made = shapes.transfer(mesh, other, reading, {**reading, **beside}, manner)
         deliver(made, mesh, file, goal, output)
 
     each([source], work, output)
