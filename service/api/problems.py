@@ -158,7 +158,7 @@ async def _http_error(request: Request, error: Exception) -> Problem:
 def from_http(scope: Scope, error: HTTPException) -> Problem:
     """The framework's error as an answer; middleware answers with it directly."""
     status = error.status_code
-    code, suggestion = _PLAIN.get(status, (HTTPStatus(status).name.lower(), "See /docs."))
+    code, suggestion = _PLAIN[status]
     detail = error.detail
     headers = dict(error.headers or {})
     if status == 400 and (told := overrun(detail)) is not None:
