@@ -105,8 +105,8 @@ def _require_alike(found: Inference, other: Inference) -> None:
     sure = [name for name, shape in ((one, found), (two, other)) if shape.in_distribution]
     raise InvalidRequest(
         "categories_differ",
-        f"the source is most like a {one} (score {found.best.score:.2f}), and the target most like "
-        f"a {two} (score {other.best.score:.2f})",
+        f"the source is taken for one of {one} (score {found.best.score:.2f}), and the target for "
+        f"one of {two} (score {other.best.score:.2f})",
         "Send two shapes of one category; or say which one to take both for: "
         + " or ".join(f"category={name}" for name in (sure or (one, two)))
         + ".",
