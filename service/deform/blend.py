@@ -28,7 +28,7 @@ from service.deform.seams import Seams, flush_seams
 from service.deform.shares import Blocks, all_shares
 from service.deform.spine import straighten
 from service.deform.spinefit import Spine
-from service.deform.weld import weld
+from service.deform.weld import Welded, weld
 from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
@@ -51,6 +51,31 @@ def bind(
         f: ``[d]`` fitted parameters, in the same scale.
         t: ``[3]`` where the template's origin lies.
     """
+    near = _near(vertices, faces, template, f, t)
+    compiler = Compiler(near.fit.template, near.fit.boxes, near.fit.groups, len(near.u))
+    for rows in blocks(len(near.u)):
+        compiler.add(rows, *near.of(rows))
+    return compiler.binding(near.welded)
+
+
+def part_weights(
+    vertices: Array, faces: NDArray[np.int64], template: AffineTemplate, f: Array, t: Array
+) -> Array32:
+    """``[V, P]`` how far vertices follow each of the template's parts, one in sum; as `bind`."""
+    near = _near(vertices, faces, template, f, t)
+    weights = np.zeros((len(near.u), near.u.shape[1]), np.float32)
+    for rows in blocks(len(near.u)):
+        _, shares, groups, _, _ = near.of(rows)
+        for index, group in enumerate(near.fit.groups):
+            members = list(group.members)
+            share = shares[:, members] if len(members) > 1 else 1.0
+            weights[rows, members] = groups[:, index, None] * share
+    return weights[near.welded.of]
+
+
+def _near(
+    vertices: Array, faces: NDArray[np.int64], template: AffineTemplate, f: Array, t: Array
+) -> _Near:
     welded = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
     f = np.asarray(f, np.float64)
     x = welded.vertices - np.asarray(t, np.float64)
@@ -66,13 +91,7 @@ def bind(
         fit.boxes, hubs,
     )  # fmt: skip
     shares = all_shares(u, fit.boxes, fit.groups, Blocks(welded.piece, high - low, votes.whole))
-    following = _Following.of(fit, spines, votes)
-    compiler = Compiler(fit.template, fit.boxes, fit.groups, len(x))
-    for rows in blocks(len(x)):
-        compiler.add(
-            rows, *following.of_some(u[rows], welded.piece[rows], to_group[rows], shares[rows])
-        )
-    return compiler.binding(welded)
+    return _Near(welded, fit, u, to_group, shares, _Following.of(fit, spines, votes))
 
 
 @dataclass(frozen=True)
@@ -146,3 +165,28 @@ class _Following:
             np.copyto(near, nearness(to_group, band).T, where=free)
         near = near.T
         return fields, shares, near, local, gains
+
+
+@dataclass(frozen=True)
+class _Near:
+    """A mesh without its seams, and what tells how it follows the parts.
+
+    Attributes:
+        welded, fit: the mesh and the template.
+        u: ``[n, P, 3]`` straightened unit coordinates.
+        to_group: ``[n, G]`` distances to the groups.
+        shares: ``[n, P]`` of the parts in their groups.
+        following: the rest of it.
+    """
+
+    welded: Welded
+    fit: _Fit
+    u: Array32
+    to_group: Array32
+    shares: Array32
+    following: _Following
+
+    def of(self, rows: slice) -> tuple[list[Field], Array32, Array32, Array32, Array32]:
+        """See `_Following.of_some`."""
+        own = self.u[rows], self.welded.piece[rows], self.to_group[rows], self.shares[rows]
+        return self.following.of_some(*own)

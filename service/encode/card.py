@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, Field, FiniteFloat, ValidationError, model_validator
 
 from service.errors import ModelFault
 
@@ -27,6 +27,36 @@ class Calibration(BaseModel):
     sigma_scale: dict[str, Scale] = {}
 
 
+Row = Annotated[list[FiniteFloat], Field(min_length=1)]
+
+
+class KindEntry(BaseModel):
+    """Real shapes of one kind: ``p`` rows of quantiles, from the least to the largest value, and
+    ``k`` rows of ``p`` loadings of their normal scores on factors."""
+
+    quantiles: list[Annotated[Row, Field(min_length=2)]] = Field(min_length=1)
+    loadings: list[Row] = Field(min_length=1)
+
+
+class DistributionEntry(BaseModel):
+    """Which shapes there really are; see `service.augment.distribution`."""
+
+    parameters: list[str] = Field(min_length=1)
+    kinds: dict[str, KindEntry]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if "all" not in self.kinds:
+            raise ValueError("kinds: lacks 'all'")
+        count = len(self.parameters)
+        for name, kind in self.kinds.items():
+            if len(kind.quantiles) != count or len({len(row) for row in kind.quantiles}) > 1:
+                raise ValueError(f"kinds.{name}: quantiles are no {count} rows of one length")
+            if any(len(row) != count for row in kind.loadings):
+                raise ValueError(f"kinds.{name}: loadings are not of {count} parameters")
+        return self
+
+
 class Card(BaseModel):
     """A card's entries that are relied on; it may have any others."""
 
@@ -39,6 +69,7 @@ class Card(BaseModel):
     mesh_encoder: FileEntry | None = None
     template_digest: str | None = None
     calibration: Calibration
+    distribution: DistributionEntry | None = None
 
 
 def read_card(path: Path) -> dict[str, Any]:
