@@ -234,3 +234,15 @@ def test_a_shape_is_put_where_the_one_before_was(human: SkinnedTemplate, strider
     floor = standing(human, strider, grown, "floor")
     lowest = [human.decode(body)[:, 1].min() for body in (strider, floor)]
     assert lowest[0] == pytest.approx(lowest[1], abs=1e-12)
+
+
+def test_a_stature_that_is_set_to_what_it_is_stays_so_in_another_shape(
+    found: BodyInference,
+) -> None:
+    tall = found.stature(found.fit.body)
+    answer = moved(found, json.dumps({"shape_1": 1.5, "stature": tall}))
+    (stature,) = answer.derived
+    assert stature.after == pytest.approx(tall, rel=1e-9)
+    values = {shift.name: shift.after for shift in answer.parameters}
+    assert values["shape_1"] == 1.5
+    assert values["shape_0"] != value(found, "shape_0")
