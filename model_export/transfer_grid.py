@@ -175,6 +175,49 @@ def _licence(shape: RealisticShape) -> str:
     return str(shape.info.get("licence", shape.info.get("license", "")))
 
 
+def gathered(
+    arguments: argparse.Namespace, model: Model, known: Inferences
+) -> tuple[list[Shape], list[Shape]]:
+    """Sources and targets; no shape is its own target."""
+    diagonal = None if model.turns_freely else 1.0
+    takers = found(arguments.sources, arguments.licences)
+    paths = {shape.path.resolve() for shape in takers}
+    givers = [
+        shape
+        for shape in found(arguments.targets, arguments.licences)
+        if shape.path.resolve() not in paths
+    ]
+    sources, targets = (
+        [Shape.of(shape.name, shape.path, diagonal) for shape in shapes]
+        for shapes in (takers, givers)
+    )
+    if not arguments.all:
+        options, models = _upright(model), {model.name: model}
+        targets = [t for t in targets if infer(t.upload, models, options, known).in_distribution]
+    return sources, targets[: arguments.count]
+
+
+def _upright(model: Model) -> InferOptions:
+    return InferOptions(model.name, "+y", "+z")
+
+
+def measured(
+    sources: Sequence[Shape], targets: Sequence[Shape], model: Model, known: Inferences
+) -> list[list[Pair]]:
+    """The grid, each pair printed as it comes."""
+    grid = []
+    for source in sources:
+        row = []
+        for target in targets:
+            pair = paired(source, target, {model.name: model}, _upright(model), known)
+            figures = (pair.source, pair.stretched, pair.transferred)
+            told = " ".join(f"{100 * figure:6.2f}" for figure in figures)
+            print(f"{source.name:32} {target.name:32} {told}")
+            row.append(pair)
+        grid.append(row)
+    return grid
+
+
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(
@@ -194,32 +237,14 @@ def main() -> None:
     parser.add_argument("--across", type=int, default=11, help="targets a row of the picture")
     parser.add_argument("--out", type=Path, default=Path("runs/transfer.png"), help="PNG to write")
     arguments = parser.parse_args()
-    model = load_models(arguments.models)[arguments.category]
-    models, options = {model.name: model}, InferOptions(model.name, "+y", "+z")
-    diagonal = None if model.turns_freely else 1.0
-    known = Inferences(HELD_BYTES)
-    givers = found(arguments.targets, arguments.licences)
-    takers = found(arguments.sources, arguments.licences)
-    names = {shape.path.resolve() for shape in takers}
-    givers = [shape for shape in givers if shape.path.resolve() not in names]
-    sources, others = ([Shape.of(s.name, s.path, diagonal) for s in s_] for s_ in (takers, givers))
-    targets = [
-        shape
-        for shape in others
-        if arguments.all or infer(shape.upload, models, options, known).in_distribution
-    ][: arguments.count]
-    grid = []
-    for source in sources:
-        row = [paired(source, target, models, options, known) for target in targets]
-        for target, pair in zip(targets, row, strict=True):
-            print(f"{source.name:32} {target.name:32} {100 * pair.source:6.2f} "
-                  f"{100 * pair.stretched:6.2f} {100 * pair.transferred:6.2f}")  # fmt: skip
-        grid.append(row)
+    model, known = load_models(arguments.models)[arguments.category], Inferences(HELD_BYTES)
+    sources, targets = gathered(arguments, model, known)
+    grid = measured(sources, targets, model, known)
     print(table(grid))
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    drawn = panels(sources, targets, grid, min(arguments.across, len(targets)))
-    columns = 1 + min(arguments.across, len(targets))
-    save_sheet(drawn, arguments.out, columns, size=1.2, aspect=0.8, same_scale=True)
+    across = min(arguments.across, len(targets))
+    drawn = panels(sources, targets, grid, across)
+    save_sheet(drawn, arguments.out, 1 + across, size=1.2, aspect=0.8, same_scale=True)
 
 
 if __name__ == "__main__":
