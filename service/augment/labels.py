@@ -11,6 +11,9 @@ from service.affineinference import AffineInference
 from service.bodyinference import BodyInference
 from service.deform.blend import part_weights
 from service.deform.followers import following
+from service.encode.affinemodel import AffineModel
+from service.encode.basemodel import Model
+from service.encode.bodymodel import BodyModel
 from service.inference import Inference
 from service.stages import stage
 from service.template.anatomy import JOINTS
@@ -29,6 +32,14 @@ class PartLabels:
     labels: NDArray[np.int16]
 
 
+def category_parts(model: Model) -> tuple[str, ...]:
+    """Names of the parts that a category's meshes are made of."""
+    if isinstance(model, BodyModel):
+        return JOINTS
+    assert isinstance(model, AffineModel)
+    return model.template.parts
+
+
 def part_labels(found: Inference) -> PartLabels:
     """The part that each vertex follows most: of the template, or a body's joint.
 
@@ -36,9 +47,9 @@ def part_labels(found: Inference) -> PartLabels:
     """
     if isinstance(found, BodyInference):
         weights = found.skin.weights
-        return PartLabels(JOINTS, weights.argmax(axis=1).astype(np.int16))
+        return PartLabels(category_parts(found.model), weights.argmax(axis=1).astype(np.int16))
     assert isinstance(found, AffineInference)
-    fit, parts = found.fit, found.model.template.parts
+    fit, parts = found.fit, category_parts(found.model)
     template = following(fit.template, fit.parameters)
     with stage("bind"):
         at = template, fit.parameters, fit.translation

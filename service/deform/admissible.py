@@ -120,6 +120,12 @@ def unusual(template: AffineTemplate, before: Array, after: Array) -> list[str]:
     ]
 
 
+def in_ranges(template: AffineTemplate, f: Array) -> bool:
+    """Whether parameters ``f [d]``, in any one unit, are within the template's ranges at some
+    size."""
+    return bool((f[_sizes(template)] > 0.0).all()) and _window(template, f) is not None
+
+
 def _window(
     template: AffineTemplate, f: Array, among: NDArray[np.intp] | None = None
 ) -> tuple[float, float] | None:
