@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TextIO
 
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 PIPED_COLUMNS = 160
 """Width of tables that go to no terminal: wide enough that nothing is cut off."""
@@ -22,3 +25,20 @@ class PlainConsole(Console):
     def on_broken_pipe(self) -> None:
         """Let the caller know, which rich would end the process for."""
         raise BrokenPipeError
+
+
+@contextmanager
+def counter(what: str, console: Console) -> Iterator[Callable[[int, int, int], None]]:
+    """A bar of files that are done, which goes when the block ends; see `Output.counting`."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[failed]} failed"),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task(what, total=None, failed=0)
+        yield lambda done, total, failed: progress.update(
+            task, completed=done, total=total or None, failed=failed
+        )

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Any
 
 import click
@@ -15,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from service import pipeline
 from service.cli.meshes import Mesh
 from service.cli.problem import Problem
-from service.cli.shapes import Made, Options
+from service.cli.shapes import Count, Made, Options
 from service.constraints import parse_constraints
 from service.edited import Edited
 from service.edits import parse_edits
@@ -83,6 +85,41 @@ class Local:
             edited = pipeline.transfer(*meshes, models, options, target_options, transfer_options)
             ids = ("source_mesh_id", "target_mesh_id")
             return _made(edited, {name: m.mesh_id for name, m in zip(ids, meshes, strict=True)})
+
+    def augment(
+        self,
+        directory: Path,
+        out: Path,
+        reading: Options,
+        how: Options,
+        options: Options,
+        tell: Count,
+    ) -> dict[str, Any]:
+        from service.augment import driver
+        from service.augment.plan import Models
+
+        settings = self.settings
+        models = Models(
+            settings.categories,
+            settings.models_dir,
+            settings.body_model,
+            settings.default_models,
+        )
+        with told():
+            summary = driver.augment(
+                directory,
+                out,
+                infer=InferOptions(**reading),
+                edit=EditOptions(**how),
+                models=models,
+                progress=lambda done, total, _, failed: tell(done, total, failed),
+                **options,
+            )
+        fields = ("code", "detail")
+        failures = [
+            {"file": name, **dict(zip(fields, why, strict=True))} for name, *why in summary.failures
+        ]
+        return {**asdict(summary), "out": str(out), "failures": failures}
 
     def categories(self) -> list[dict[str, Any]]:
         with told():

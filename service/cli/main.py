@@ -8,6 +8,7 @@ from io import TextIOWrapper
 
 import click
 
+from service.cli.commands.augment import augment
 from service.cli.commands.categories import categories
 from service.cli.commands.completion import completion
 from service.cli.commands.edit import edit
@@ -59,7 +60,7 @@ def cli() -> None:
     """
 
 
-for command in (infer, edit, sliders, template, transfer, categories, serve, completion):
+for command in (infer, edit, sliders, template, transfer, augment, categories, serve, completion):
     cli.add_command(command)
 
 

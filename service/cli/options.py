@@ -109,11 +109,15 @@ def reading_options() -> Decorator:
             default=True,
             help="Whether to improve the values by a fit to the mesh.",
         ),
-        click.option(
-            "--name",
-            metavar="FILENAME",
-            help="What the mesh from standard input is called; the suffix tells its format.",
-        ),
+    )
+
+
+def name_option() -> Decorator:
+    """--name."""
+    return click.option(
+        "--name",
+        metavar="FILENAME",
+        help="What the mesh from standard input is called; the suffix tells its format.",
     )
 
 

@@ -72,6 +72,24 @@ class Output:
         with self.errors.status(what) as status:
             yield lambda far: status.update(f"{what}  {far}")
 
+    @contextmanager
+    def counting(self, what: str) -> Iterator[Callable[[int, int, int], None]]:
+        """Show on a terminal how many files are done, until the block ends.
+
+        Args:
+            what: is gone through.
+
+        Yields:
+            a function that takes how many are done, of how many, and how many failed.
+        """
+        if self.quiet or not sys.stderr.isatty():
+            yield lambda *_: None
+            return
+        from service.cli.consoles import counter
+
+        with counter(what, self.errors) as tell:
+            yield tell
+
     def show(self, *what: RenderableType) -> None:
         """Tell people."""
         if self.talks:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 from service.cli.meshes import Mesh
 
 Options = Mapping[str, Any]
 """Options by the names that the pipeline and the HTTP contract give them."""
+
+
+Count = Callable[[int, int, int], None]
+"""Takes how many are done, of how many, and how many of these failed."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,25 @@ class Shapes(Protocol):
     ) -> Made:
         """The source with the target's parameters; `how` has those of `edit`, and parameters, size,
         position."""
+
+    def augment(
+        self,
+        directory: Path,
+        out: Path,
+        reading: Options,
+        how: Options,
+        options: Options,
+        tell: Count,
+    ) -> dict[str, Any]:
+        """Variants of the meshes of a folder; what was done, in numbers.
+
+        Args:
+            directory, out: where meshes are, and where to write.
+            reading: how all of them are to be read.
+            how: as for `edit`.
+            options: count, seed, strength, engine, workers, shard, deadline_s, force.
+            tell: called with how many are done, of how many, and how many failed.
+        """
 
     def categories(self) -> list[dict[str, Any]]:
         """What can be inferred and edited."""

@@ -88,6 +88,27 @@ def edited(report: Report, written: str | None) -> list[RenderableType]:
     return [head, *([table] if table.row_count else []), *warnings(report["warnings"])]
 
 
+def augmented(summary: Report) -> list[RenderableType]:
+    """What a batch did."""
+    counts = {
+        "meshes": summary["sources"],
+        "done before": summary["kept"],
+        "done": summary["done"],
+        "of these failed": summary["failed"],
+        "variants": summary["ok"],
+        "rejected": summary["rejected"],
+    }
+    table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
+    for name, count in counts.items():
+        table.add_row(name, f"{count:,}")
+    failures = [
+        Text(f"Failed: {entry['file']}: {entry['code']}: {entry['detail']}", style="red")
+        for entry in summary["failures"]
+    ]
+    where = f"{summary['out']}   {summary['seconds']:.1f} s"
+    return [Text(where, style="bold"), table, *failures]
+
+
 def categories(entries: Iterable[Report]) -> Table:
     """All categories."""
     table = _table("category", "", "model", "parameters", "keep")

@@ -17,6 +17,7 @@ from cli_runs import Run
 from pretend_body import saved
 
 import service.__main__
+from service.augment import driver
 from service.cli.local import Local
 from service.cli.main import cli
 from service.encode.installed import Installed
@@ -80,7 +81,10 @@ def folder(
         return loads(once, name)
 
     monkeypatch.setattr(Local, "_load", load)
+    (tmp_path / "chairs").mkdir()
     monkeypatch.setattr(service.__main__, "main", lambda arguments, program: 0)
+    # Its workers are processes of their own, which load models anew; it has tests of its own.
+    monkeypatch.setattr(driver, "augment", lambda directory, out, **_: driver.Summary(out))
     return tmp_path
 
 

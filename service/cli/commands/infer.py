@@ -11,6 +11,7 @@ from service.cli.names import MeshFile
 from service.cli.options import (
     READING,
     Where,
+    name_option,
     picked,
     reading_options,
     telling_options,
@@ -23,6 +24,7 @@ from service.cli.run import each
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=MeshFile())
 @reading_options()
+@name_option()
 @telling_options()
 @where_options()
 def infer(

@@ -13,6 +13,7 @@ from service.cli.names import MeshFile
 from service.cli.options import (
     READING,
     Where,
+    name_option,
     offering_options,
     picked,
     reading_options,
@@ -32,6 +33,7 @@ FORMAT = "glb"
 @writing_options("sliders.glb")
 @offering_options()
 @reading_options()
+@name_option()
 @telling_options()
 @where_options()
 def sliders(files: tuple[str, ...], url: str | None, api_key: str | None, **given: Any) -> None:
@@ -53,6 +55,7 @@ def sliders(files: tuple[str, ...], url: str | None, api_key: str | None, **give
 @writing_options("template.glb")
 @offering_options()
 @reading_options()
+@name_option()
 @telling_options()
 @where_options()
 def template(files: tuple[str, ...], url: str | None, api_key: str | None, **given: Any) -> None:

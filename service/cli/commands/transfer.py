@@ -14,6 +14,7 @@ from service.cli.options import (
     READING,
     Where,
     editing_options,
+    name_option,
     picked,
     reading_options,
     telling_options,
@@ -62,6 +63,7 @@ HOW = ("keep", "mode", "format", "strict", "parameters", "size", "position")
 @click.option("-n", "--dry-run", is_flag=True, help="Tell what it would do; write nothing.")
 @editing_options()
 @reading_options()
+@name_option()
 @telling_options()
 @where_options()
 def transfer(
