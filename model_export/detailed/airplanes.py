@@ -19,6 +19,7 @@ The truth is an airframe builder's:
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from model_export.detailed.shape import DetailedShape, named
 from model_export.detailed.surfaces import (
     fin,
     fin_sections,
+    side_fins,
     tail_level,
     tail_sections,
     tailplane,
@@ -42,13 +44,14 @@ AIRPLANE_NAMES = (
 )  # fmt: skip
 
 
-def detailed_airplane(seed: int, density: int | None = None) -> DetailedShape:
+def detailed_airplane(seed: int, density: int | None = None, **style: Any) -> DetailedShape:
     """The airplane of a seed; every third is welded.
 
     Args:
         seed: of all that is drawn.
         density: how finely it is cut, from 1 (600 to 4 000 vertices) to 12 (60 000 to 150 000);
             drawn from 2 to 4 by default.
+        style: what is not to be drawn, by its name in `_style`; lengths in metres.
     """
     rng = np.random.default_rng([2021, seed])
     length = np.exp(rng.uniform(np.log(7.0), np.log(45.0)))
@@ -57,19 +60,20 @@ def detailed_airplane(seed: int, density: int | None = None) -> DetailedShape:
     share = [height, 1.0, width, *rng.uniform([0.33, 0.09, 0.14], [0.52, 0.15, 0.20])]
     parameters = length * np.array(share)
     welded = seed % 3 == 2
-    style = _style(rng, named(AIRPLANE_NAMES, parameters), welded)
-    style.density = density or style.density
     p = named(AIRPLANE_NAMES, parameters)
+    s = _style(rng, p, welded)
+    vars(s).update(style)
+    s.density = density or s.density
     # Legs are of one length for all parameters, and their wheels stand on one floor for these.
-    floor = -p.fuselage_height / 2 - style.gear
-    style.legs = {name: float(foot[1] - floor) for name, foot in feet(p, style).items()}
+    floor = -p.fuselage_height / 2 - s.gear
+    s.legs = {name: float(foot[1] - floor) for name, foot in feet(p, s).items()}
     builder = onepiece.airplane if welded else _assembled
 
     def build(p: SimpleNamespace) -> Mesh:
-        return builder(p, style)
+        return builder(p, s)
 
     return DetailedShape(
-        "airplane", AIRPLANE_NAMES, parameters, build(p)[1], welded, _nuisances(p, style), "", build
+        "airplane", AIRPLANE_NAMES, parameters, build(p)[1], welded, _nuisances(p, s), "", build
     )
 
 
@@ -130,14 +134,20 @@ def _style(rng: np.random.Generator, p: SimpleNamespace, welded: bool) -> Simple
         gear=rng.choice([0.0, 1.0]) * rng.uniform(0.35, 0.6) * p.fuselage_height,
         pods=int(rng.choice([0, 2, 3])),
         struts=bool(rng.random() < 0.4),
+        tailplane=True,
+        side_fins=False,
         density=int(rng.integers(2, 5)),
         inset=0.3 * p.fuselage_width,
     )
 
 
 def _assembled(p: SimpleNamespace, s: SimpleNamespace) -> Mesh:
-    pieces = [skin.fuselage(p, s), *wings(p, s), *tailplane(p, s), fin(p, s)]
-    return join([*pieces, *fittings(p, s)])
+    pieces = [skin.fuselage(p, s), *wings(p, s), fin(p, s), *fittings(p, s)]
+    if s.tailplane:
+        pieces += tailplane(p, s)
+    if s.side_fins:
+        pieces += side_fins(p, s)
+    return join(pieces)
 
 
 def _nuisances(p: SimpleNamespace, s: SimpleNamespace) -> dict[str, float]:

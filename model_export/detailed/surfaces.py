@@ -126,6 +126,16 @@ def fin(p: SimpleNamespace, s: SimpleNamespace) -> Mesh:
     return wing(middle, up, chord, thick, aerofoil(4 * s.density, 0.0))
 
 
+def side_fins(p: SimpleNamespace, s: SimpleNamespace) -> list[Mesh]:
+    """Two more, on the tailplane's tips; they are two thirds as large."""
+    vertices, faces = fin(p, s)
+    x, z, _ = tail_sections(p, s, np.array([0.9]))
+    low = vertices.min(axis=0)
+    small = (vertices - [0.0, low[1], low[2]]) * 0.67
+    small += [x[0], tail_level(p, s)[0] - 0.1 * s.fin_chord, z[0] - s.tail_tip / 2]
+    return [(small, faces), mirrored((small, faces))]
+
+
 def tail_level(p: SimpleNamespace, s: SimpleNamespace) -> tuple[float, float]:
     """Height of the tailplane, and half the width of what it leaves there."""
     if s.on_fin:

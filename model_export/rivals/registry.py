@@ -23,6 +23,7 @@ class Entry:
         makes_anew: the mesh that it answers with is another.
         limit: seconds for one mesh, binding and all edits.
         slow: it is left out of quick runs.
+        most: inputs of a source that it is asked for, where that takes long.
     """
 
     rule: Rival
@@ -30,13 +31,16 @@ class Entry:
     makes_anew: bool = False
     limit: float = 120.0
     slow: bool = False
+    most: int | None = None
 
 
 RIVALS: dict[str, Entry] = {
     "global scale": Entry(global_scale),
     "nine-slice": Entry(nine_slice),
     "cage (bound)": Entry(caged, knows_truth=True),
-    "re-synthesis (bound)": Entry(resynthesised, knows_truth=True, makes_anew=True, slow=True),
+    "re-synthesis (bound)": Entry(
+        resynthesised, knows_truth=True, makes_anew=True, slow=True, most=4
+    ),
     "as-rigid-as-possible": Entry(as_rigid_as_possible, slow=True),
     "radial basis": Entry(radial),
     "paper, k = 1": Entry(paper_rule(1)),

@@ -1,0 +1,1 @@
+"""The benchmark: every rival on the same inputs, by the same measures."""

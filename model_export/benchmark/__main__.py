@@ -1,0 +1,129 @@
+"""Every rival on the same inputs: ``python -m model_export.benchmark --out DIR``.
+
+Writes `report.md`, `rivals.png` and `results.jsonl`.  A run that is cut off goes on where it was:
+remove `results.jsonl` to begin anew.  As-rigid-as-possible and re-synthesis need the extra
+`benchmark`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from model_export.benchmark.case import Case
+from model_export.benchmark.inputs import (
+    DETAILED,
+    detailed_case,
+    detailed_cases,
+    real_cases,
+    template_cases,
+)
+from model_export.benchmark.outliers import outlier_cases
+from model_export.benchmark.report import Checks, write_report
+from model_export.benchmark.runner import Results, run_case
+from model_export.benchmark.service_checks import continuity, identity, mirrored_parameters
+from model_export.benchmark.sheet import draw_rivals
+from model_export.config import SHIPPED
+from model_export.rivals.registry import RIVALS, Entry
+from service.encode.model import Model, load_models
+
+CATEGORIES = ("chair", "airplane")
+DRAWN = {
+    "chair": ((0, "seat_width", 1.4), (4, "leg_height", 0.7), (2, "leg_width", 1.4)),
+    "airplane": ((0, "wing_length", 1.4), (6, "fuselage_length", 0.7), (5, "fuselage_width", 1.4)),
+}
+"""Seeds, parameters and factors of the edits in the picture."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much of each source: D, S and R a category; and how finely D is cut."""
+
+    detailed: int
+    templates: int
+    real: int
+    density: int | None
+    sliders: int
+    checked: int
+
+
+FULL, QUICK = Plan(12, 4, 8, None, 8, 3), Plan(2, 1, 2, 2, 1, 1)
+
+
+def cases(model: Model, plan: Plan, folder: Path | None) -> Iterator[tuple[int, Case]]:
+    """All inputs of a category, numbered within their source."""
+    sources: list[Iterable[Case]] = [
+        detailed_cases(model, plan.detailed, plan.density),
+        template_cases(model, plan.templates),
+        outlier_cases(model),
+    ]
+    if folder is not None:
+        sources.append(real_cases(model, folder, plan.real))
+    for source in sources:
+        yield from enumerate(source)
+
+
+def check(model: Model, plan: Plan) -> Checks:
+    """What is asked of the service as a whole."""
+    some = list(detailed_cases(model, plan.checked, plan.density))
+    names = [p.name for p in model.template.parameters if not p.nuisance][: plan.sliders]
+    return Checks(
+        identities=[identity(model, case) for case in some],
+        mirrored=[mirrored_parameters(model, case) for case in some],
+        sliders=continuity(model, some[0], names),
+    )
+
+
+def draw(models: dict[str, Model], rivals: dict[str, Entry], path: Path) -> None:
+    """The edits of `DRAWN`."""
+    wanted = []
+    for name, edits in DRAWN.items():
+        for seed, parameter, factor in edits:
+            case = detailed_case(models[name], DETAILED[name](seed, 2), seed)
+            wanted.append((case, parameter, factor))
+    draw_rivals(wanted, rivals, path)
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m model_export.benchmark", description=__doc__)
+    parser.add_argument("--out", type=Path, required=True, help="folder to write to")
+    parser.add_argument("--quick", action="store_true", help="a few inputs, without slow rivals")
+    parser.add_argument("--chairs", type=Path, help="folder of real chairs")
+    parser.add_argument("--airplanes", type=Path, help="folder of real airplanes")
+    parser.add_argument("--models", type=Path, default=SHIPPED, help="models folder")
+    parser.add_argument("--rival", choices=RIVALS, action="append", help="these only")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    plan = QUICK if options.quick else FULL
+    rivals = {
+        name: entry
+        for name, entry in RIVALS.items()
+        if name in (options.rival or RIVALS) and not (options.quick and entry.slow)
+    }
+    began = time.monotonic()
+
+    def say(text: str) -> None:
+        print(f"{time.monotonic() - began:7.1f} s  {text}", file=sys.stderr)
+
+    models = load_models(options.models)
+    results = Results(options.out / "results.jsonl")
+    folders = {"chair": options.chairs, "airplane": options.airplanes}
+    checks = {}
+    for name in CATEGORIES:
+        for number, case in cases(models[name], plan, folders[name]):
+            run_case(case, number, rivals, results, say)
+        say(f"the service as a whole, {name}")
+        checks[name] = check(models[name], plan)
+    say("pictures")
+    draw(models, rivals, options.out / "rivals.png")
+    write_report(results.rows, checks, options.out / "report.md")
+    say(f"wrote {options.out / 'report.md'}")
+
+
+if __name__ == "__main__":
+    main()
