@@ -24,18 +24,12 @@ def idle(template: AffineTemplate) -> Which:
     return template.public & ~template.active
 
 
-def negligible(template: AffineTemplate, lengths: Array) -> Which:
-    """The parameters that say next to nothing of a shape.
-
-    Where a main size is next to none, the parts that it moves are not there: the other parameters
-    that move these alone are of nothing, whatever was fitted.
+def missing(template: AffineTemplate, lengths: Array) -> frozenset[str]:
+    """Names of the parts that a shape has next to nothing of: their main size is next to none.
 
     Args:
         template: the variant that was fitted.
         lengths: ``[d]`` its parameters, in any unit.
-
-    Returns:
-        ``[d]``, false for those that move nothing at all and for those that users don't see.
     """
     low, high = np.array([parameter.typical for parameter in template.parameters]).T
     sizes = template.public & template.active & (low > 0.0)
@@ -43,10 +37,24 @@ def negligible(template: AffineTemplate, lengths: Array) -> Which:
     # The median is of the shape, whatever one of its sizes is; large ones tell more.
     ratio = _median(lengths[sizes] / middle[sizes], middle[sizes])
     main = sizes & (low >= MAIN * np.max(low[sizes], initial=0.0))
-    moves: Which = _moved_parts(template)
+    moves = _moved_parts(template)
     none = main & (lengths < NEGLIGIBLE * ratio * low) & ~moves.all(axis=1)
-    within: Which = ~np.any(moves[:, None] & ~moves[None], axis=2)
-    return np.asarray(template.public & template.active & np.any(within[:, none], axis=1))
+    return frozenset(np.array(template.parts)[moves[none].any(axis=0)].tolist())
+
+
+def negligible(template: AffineTemplate, lengths: Array) -> Which:
+    """The parameters that say next to nothing of a shape, whatever was fitted: those that move but
+    parts that are `missing`.
+
+    Args:
+        template, lengths: as `missing`.
+
+    Returns:
+        ``[d]``, false for those that move nothing at all and for those that users don't see.
+    """
+    there = ~np.isin(template.parts, list(missing(template, lengths)))
+    moves = _moved_parts(template)
+    return np.asarray(template.public & template.active & ~moves[:, there].any(axis=1))
 
 
 def differing(template: AffineTemplate, other: AffineTemplate) -> Which:
@@ -84,6 +92,6 @@ def _median(values: Array, weights: Array) -> float:
 
 def _moved_parts(template: AffineTemplate) -> Which:
     """``[d, P]`` whether each parameter moves anything of each part."""
-    moves = np.asarray(template.jacobian.any(axis=1))
+    moves: Which = np.any(template.jacobian != 0.0, axis=1)
     parts = [moves[template.part == part].any(axis=0) for part in range(len(template.parts))]
     return np.stack(parts, axis=1)

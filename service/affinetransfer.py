@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
-from service.absent import differing, idle, negligible
+from service.absent import differing, idle, missing, negligible
 from service.affineinference import AffineInference
 from service.edited import Moved
 from service.requests import TransferOptions
@@ -17,7 +17,6 @@ from service.template.affine import AffineTemplate
 from service.transfer import (
     Taken,
     canonical,
-    extents,
     of_target,
     set_to,
     shifted,
@@ -32,9 +31,10 @@ def take(
 ) -> Taken:
     """What an edit of a shape takes from another.
 
-    Lengths are the target's own; with ``size=source`` times the ratio of the diagonals of the two
-    meshes' bounding boxes along the canonical axes, so that the target's proportions come at the
-    source's size.
+    Lengths are the target's own; with ``size=source`` times the ratio of the two sizes, so that the
+    target's proportions come at the source's size.  That is the diagonal of the fitted template's
+    bounding box along the canonical axes, less what one of the two has next to nothing of: beside a
+    stool, a chair counts without its back.
 
     Args:
         found: the source.
@@ -47,7 +47,7 @@ def take(
     """
     names, warnings = _moving(_wanted(found, other, options), found, other)
     ratio = unit_ratio(found, other)
-    scale = _size(found) / (_size(other) * ratio) if options.size == "source" else 1.0
+    scale = 1.0 if options.size == "target" else _size_ratio(found, other) / ratio
     theirs, own = _values(other), _values(found)
     values = {name: theirs[name] * ratio for name in names}
     edits = set_to({name: value * scale for name, value in values.items()}, own)
@@ -105,9 +105,20 @@ def _values(found: AffineInference) -> dict[str, float]:
     return own | found.dimensions().derived(found.parameters)
 
 
-def _size(found: AffineInference) -> float:
-    """Diagonal of the mesh's bounding box, in the reported unit."""
-    return float(np.linalg.norm(extents(found))) * found.unit_scale
+def _size_ratio(found: AffineInference, other: AffineInference) -> float:
+    """How many times as large the first is as the other, each in its reported unit."""
+    without: set[str] = set()
+    for shape in (found, other):
+        without |= missing(shape.fit.template, shape.parameters)
+    return _size(found, without) / _size(other, without)
+
+
+def _size(found: AffineInference, without: Set[str]) -> float:
+    """Diagonal of the fitted template's bounding box, in the reported unit, less some parts."""
+    template = found.fit.template
+    counted = ~np.isin(template.parts, list(without))
+    vertices = template.decode(found.parameters)[counted[template.part]]
+    return float(np.linalg.norm(np.ptp(vertices, axis=0)))
 
 
 def place(moved: Moved, goal: Array | None, keep: str) -> Moved:

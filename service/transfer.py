@@ -105,8 +105,8 @@ def _require_alike(found: Inference, other: Inference) -> None:
     sure = [name for name, shape in ((one, found), (two, other)) if shape.in_distribution]
     raise InvalidRequest(
         "categories_differ",
-        f"the source is taken for one of {one} (score {found.best.score:.2f}), and the target for "
-        f"one of {two} (score {other.best.score:.2f})",
+        f"by its shape the source is of the category {one} (score {found.best.score:.2f}), and the "
+        f"target of {two} (score {other.best.score:.2f})",
         "Send two shapes of one category; or say which one to take both for: "
         + " or ".join(f"category={name}" for name in (sure or (one, two)))
         + ".",
@@ -121,16 +121,11 @@ def shifted(moved: Moved, shift: Array) -> Moved:
         shift: ``[3]`` along the canonical axes, in the reported unit.
     """
     found = moved.found
-    size = np.linalg.norm(extents(found)) * found.unit_scale
+    size = np.linalg.norm(np.ptp(canonical(found, found.mesh.vertices), axis=0))
     if np.linalg.norm(shift) <= SAME * size:
         return moved
     own = found.best.orientation.to_own(shift[None] / found.unit_scale)
     return replace(moved, vertices=moved.vertices + own)
-
-
-def extents(found: Inference) -> Array:
-    """``[3]`` of the mesh along the canonical axes, in the file's unit."""
-    return np.asarray(np.ptp(found.best.orientation.to_canonical(found.mesh.vertices), axis=0))
 
 
 def canonical(found: Inference, vertices: Array) -> Array:

@@ -88,6 +88,20 @@ def test_a_reading_without_arms_and_one_with_them_share_all(found: AffineInferen
     assert len(taken.edits) == 8
 
 
+def test_beside_a_stool_a_chair_counts_without_its_back(found: AffineInference) -> None:
+    options = TransferOptions(size="source")
+    stool = other(found, back_height=0.01)
+    assert take(found, stool, options, "floor").scale == pytest.approx(1.0)
+    assert take(stool, found, options, "floor").scale == pytest.approx(1.0)
+    small = other(found, **{
+        name: 0.5 * value
+        for name, value in zip(found.fit.template.names, found.parameters.tolist(), strict=True)
+    })  # fmt: skip
+    taken = take(found, small, options, "floor")
+    assert taken.scale == pytest.approx(2.0, rel=1e-6)
+    assert taken.edits["seat_width"].amount == pytest.approx(2.0 * taken.values["seat_width"])
+
+
 def test_the_target_is_named_by_what_is_told_of_it(found: AffineInference) -> None:
     wider = other(found, seat_width=0.6)
     options = TransferOptions(parameters=("seat_width", "seat_top_height"))

@@ -203,7 +203,7 @@ def test_the_source_keeps_its_size_and_gets_the_proportions(
     assert np.linalg.norm(own) == pytest.approx(np.linalg.norm(before), rel=0.02)
     np.testing.assert_allclose(own / np.linalg.norm(own), box / np.linalg.norm(box), atol=0.02)
     scale = np.linalg.norm(before) / np.linalg.norm(30.0 * box)
-    assert edited.report["transfer"]["scale"] == pytest.approx(scale, rel=1e-6)
+    assert edited.report["transfer"]["scale"] == pytest.approx(scale, rel=0.01)
     (large_one,) = [w for w in edited.report["warnings"] if "times" in w]
     assert large_one.startswith("target: a chair of this size would be ")
 
@@ -279,8 +279,8 @@ def test_shapes_of_two_categories_do_not_go_together(
     with pytest.raises(InvalidRequest) as error:
         transfer(source, airplane(), models, ANY, ANY, TransferOptions(), known)
     assert error.value.code == "categories_differ"
-    assert "the source is taken for one of chair (score " in error.value.detail
-    assert "the target for one of airplane (score " in error.value.detail
+    assert "the source is of the category chair (score " in error.value.detail
+    assert "the target of airplane (score " in error.value.detail
     assert "category=chair" in error.value.suggestion
     both = replace(ANY, category="chair")
     edited = transfer(source, airplane(), models, both, both, TransferOptions(), known)
