@@ -22,10 +22,10 @@ Every public parameter times {FACTORS[0]} and {FACTORS[1]}.  A cell with three f
 true parameters, with parameters wrong by 5 % either way, and with those that the model infers from
 the mesh alone; rivals marked "bound" are fitted to the true edit itself.  Lengths are shares of the
 bounding box's diagonal.  EA is the mean error over the mean true motion: 0 is perfect, 1 did
-nothing.  An edit has passed with EA below {BEST["accuracy"]}, what should stay moved by less than
-{BEST["locality"]}, no face flipped, less than a thousandth of the faces degenerate, and no gap of
-{BEST["gap"]} or more between pieces that touched (99th percentile); a rival that answers with
-another mesh never passes.  Flips are counted against the true edit's normals, or the input's where
+nothing.  An edit is near with EA below {BEST["accuracy"]}, what should stay moved by less than
+{BEST["locality"]}, and no face flipped; it has passed if besides less than a thousandth of the faces
+are degenerate, and no gap of {BEST["gap"]} or more has opened between pieces that touched (99th
+percentile).  A rival that answers with another mesh never passes.  Flips are counted against the true edit's normals, or the input's where
 there is no truth.
 
 ![rivals](rivals.png)

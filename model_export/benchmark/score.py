@@ -43,7 +43,8 @@ class Score:
         gap: 99th percentile of how far what touched comes apart.
         asymmetry: added by the edit.
         order: whether vertices and faces are the input's, in its order.
-        passed: whether the edit counts as good (see `BEST`).
+        near: whether it is accurate, local and without flips,
+        passed: and sound besides (see `BEST`).
     """
 
     accuracy: float | None = None
@@ -58,6 +59,7 @@ class Score:
     gap: float | None = None
     asymmetry: float | None = None
     order: bool = True
+    near: bool = False
     passed: bool = False
 
 
@@ -118,15 +120,16 @@ class Judge:
             detail = laplacian_change(x, y, self.faces)
             return Score(detail=detail, passed=passed, **sound)
         accuracy, tail = edit_accuracy(x, y, truth)
-        near = {"accuracy": accuracy, "locality": locality(x, y, truth)}
+        close = {"accuracy": accuracy, "locality": locality(x, y, truth)}
         edge, edge_tail = edge_ratio(y, truth, self._edges)
         return Score(
             tail=tail,
             dimension=dimension_error(x, y, truth, edit.factor),
             edge=edge,
             edge_tail=edge_tail,
-            passed=_good(near | sound, tuple(BEST)),
-            **near,
+            near=_good(close | sound, ("accuracy", "locality", "flips")),
+            passed=_good(close | sound, tuple(BEST)),
+            **close,
             **sound,
         )
 

@@ -37,6 +37,7 @@ TRUTH: dict[str, tuple[str, Format]] = {
     "p99 edge ratio": ("edge_tail", _number(2)),
     "flips / 1000": ("flips", _number(1)),
     "gaps": ("gap", _small),
+    "near, %": ("near", _share),
     "passed, %": ("passed", _share),
 }
 """Columns for inputs whose true edits are known: the measure, and how it is written."""
@@ -70,11 +71,11 @@ def table(rows: Sequence[Row], columns: dict[str, tuple[str, Format]]) -> str:
 
 
 def mean(rows: Iterable[Row], measure: str) -> float | None:
-    """Of all edits that were answered; `passed` counts the others too, as not passed."""
+    """Of all edits that were answered; shares are of the others too."""
     rows = list(rows)
     values = [score[measure] for row in rows for score in row["scores"]]
     values = [float(value) for value in values if value is not None]
-    if measure == "passed":
+    if measure in ("near", "passed"):
         return sum(values) / max(sum(row["edits"] for row in rows), 1)
     return float(np.mean(values)) if values else None
 
