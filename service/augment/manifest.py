@@ -20,7 +20,7 @@ try:
 except ModuleNotFoundError:
     pa = parquet = None
 
-FIGURES = ("flipped_faces", "degenerate_faces", "new_intersections", "opened_gaps")
+FIGURES = ("flipped_faces", "degenerate_faces", "new_crossings_per_10k", "opened_gaps")
 
 
 def require_arrow() -> None:
