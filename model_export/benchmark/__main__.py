@@ -33,8 +33,8 @@ from service.encode.model import Model, load_models
 
 CATEGORIES = ("chair", "airplane")
 DRAWN = {
-    "chair": ((0, "seat_width", 1.4), (4, "leg_height", 0.7), (2, "leg_width", 1.4)),
-    "airplane": ((0, "wing_length", 1.4), (6, "fuselage_length", 0.7), (5, "fuselage_width", 1.4)),
+    "chair": ((0, "seat_depth", 1.4), (2, "leg_width", 1.4)),
+    "airplane": ((15, "wing_length", 1.4), (5, "fuselage_width", 1.4)),
 }
 """Seeds, parameters and factors of the edits in the picture."""
 

@@ -23,10 +23,11 @@ true parameters, with parameters wrong by 5 % either way, and with those that th
 the mesh alone; rivals marked "bound" are fitted to the true edit itself.  Lengths are shares of the
 bounding box's diagonal.  EA is the mean error over the mean true motion: 0 is perfect, 1 did
 nothing.  An edit is near with EA below {BEST["accuracy"]}, what should stay moved by less than
-{BEST["locality"]}, and no face flipped; it has passed if besides less than a thousandth of the faces
-are degenerate, and no gap of {BEST["gap"]} or more has opened between pieces that touched (99th
-percentile).  A rival that answers with another mesh never passes.  Flips are counted against the true edit's normals, or the input's where
-there is no truth.
+{BEST["locality"]}, and no face flipped; it has passed if besides less than a thousandth of the
+faces are degenerate, and no gap of {BEST["gap"]} or more has opened between pieces that touched
+(99th percentile).  A rival that answers with another mesh never passes.  Flips are counted against
+the true edit's normals, or the input's where there is no truth.  In the picture red is what lies
+1 % of the diagonal or more from where it should.
 
 ![rivals](rivals.png)
 """

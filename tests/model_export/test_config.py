@@ -19,6 +19,7 @@ def test_the_defaults_are_the_papers() -> None:
     assert (config.shared, config.head) == ((64, 128, 128, 256), None)
     assert config.keypoints is None
     assert config.editing
+    assert (config.edit, config.norm) == ("multiply", "l2")
     assert not config.cosine
 
 
@@ -65,6 +66,15 @@ def test_a_setting_that_does_not_exist_is_refused(tmp_path: Path) -> None:
         load_config(str(path))
     with pytest.raises(ValueError, match="no setting is named 'rate'"):
         load_config("chair", rate=1.0)
+
+
+def test_a_law_of_edits_or_a_norm_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("edit: add\n", "utf-8")
+    with pytest.raises(ValueError, match="edit is one of multiply, set, cycle, not 'add'"):
+        load_config(str(path))
+    with pytest.raises(ValueError, match="norm is one of l2, l1, not 'l3'"):
+        load_config("chair", norm="l3")
 
 
 def test_a_configuration_that_does_not_exist_is_refused() -> None:

@@ -109,6 +109,81 @@ def test_the_editing_branch_edits_prediction_and_truth_alike(
     assert set(losses.synthetic(predicted, as_batch(labels), None)) == {"sem", "rec"}
 
 
+def test_a_parameter_that_is_set_can_not_be_off(
+    chair: AffineTemplate, labels: Tensor, predicted: Tensor
+) -> None:
+    own = Losses(chair, torch.ones(11), edit="set")
+    factors = draw_edit(4, 8, torch.Generator().manual_seed(2), "cpu")
+    guess = predicted.clone().requires_grad_()
+    edited, target = own.branch(guess, as_batch(labels), factors, None)
+    assert torch.equal(target, own.edit(labels, factors))
+    changed = torch.cat([factors != 1.0, torch.zeros(4, 3, dtype=torch.bool)], dim=1)
+    assert torch.equal(edited[changed], target[changed])
+    assert torch.equal(edited[~changed], predicted[~changed])
+    own.semantic(edited, target, ONLY).backward()
+    assert guess.grad is not None
+    assert torch.equal(guess.grad != 0.0, ~changed)
+
+
+def test_a_setting_edit_keeps_the_odds_of_the_variants(kinds: AffineTemplate) -> None:
+    own = Losses(kinds, torch.ones(8), edit="set")
+    labels = torch.tensor([[1.0, 0.1, 0.8]])
+    batch = Batch(torch.zeros(1, 1, 3), labels, torch.zeros(1, 3), torch.tensor([0]))
+    predicted = torch.tensor([[1.1, 0.2, 0.9, 0.1, 0.2, 0.3, 2.0, 5.0]])
+    edited, _ = own.branch(predicted, batch, torch.tensor([[1.5, 1.0, 1.0]]), None)
+    expected = torch.tensor([[1.5, 0.2, 0.9, 0.1, 0.2, 0.3, 2.0, 5.0]])
+    assert torch.equal(edited, expected)
+
+
+def test_a_cycle_encodes_the_edited_prediction_and_asks_for_the_edited_truth(
+    chair: AffineTemplate, labels: Tensor, predicted: Tensor
+) -> None:
+    own = Losses(chair, torch.ones(11), edit="cycle")
+    factors = draw_edit(4, 8, torch.Generator().manual_seed(2), "cpu")
+    guess = predicted.clone().requires_grad_()
+    batch = Batch(torch.zeros(4, 500, 3), labels[:, :8], labels[:, 8:], ONLY)
+    seen: list[Tensor] = []
+
+    def encode(clouds: Tensor) -> Tensor:
+        seen.append(clouds)
+        return torch.cat([clouds.amax(dim=1)] * 4, dim=1)[:, :11]
+
+    again, target = own.branch(guess, batch, factors, encode)
+    (clouds,) = seen
+    assert clouds.shape == (4, 500, 3)
+    np.testing.assert_allclose(clouds.detach().mean(dim=1), 0.0, atol=1e-6)
+    np.testing.assert_allclose(clouds.detach().norm(dim=2).amax(dim=1), 0.6, rtol=1e-5)
+    # The truth edited, in the frame of the cloud: its lengths in proportion.
+    ratio = (target[:, :8] / (labels[:, :8] * factors)).numpy()
+    np.testing.assert_allclose(ratio, np.broadcast_to(ratio[:, :1], ratio.shape), rtol=1e-5)
+    assert not target.requires_grad
+    own.semantic(again, target, ONLY).backward()
+    assert guess.grad is not None
+    assert guess.grad.abs().sum() > 0
+
+
+def test_a_perfect_prediction_is_asked_in_a_cycle_for_what_its_cloud_shows(
+    chair: AffineTemplate, labels: Tensor
+) -> None:
+    own = Losses(chair, torch.ones(11), edit="cycle")
+    factors = draw_edit(4, 8, torch.Generator().manual_seed(2), "cpu")
+    batch = Batch(torch.zeros(4, 4000, 3), labels[:, :8], labels[:, 8:], ONLY)
+    clouds: list[Tensor] = []
+    _, target = own.branch(labels, batch, factors, lambda c: (clouds.append(c), labels)[1])
+    low, high = clouds[0].amin(dim=1), clouds[0].amax(dim=1)
+    vertices = own.decode(target)
+    np.testing.assert_allclose(low, vertices.amin(dim=1), atol=0.03)
+    np.testing.assert_allclose(high, vertices.amax(dim=1), atol=0.03)
+
+
+def test_the_semantic_loss_may_be_of_absolute_values(
+    chair: AffineTemplate, labels: Tensor, predicted: Tensor
+) -> None:
+    own = Losses(chair, torch.full((11,), 0.1), norm="l1")
+    expected = (predicted - labels).abs().mean() / 0.1
+    assert own.semantic(predicted, labels, ONLY).item() == pytest.approx(expected.item(), rel=1e-5)
+
+
 def test_edits_are_log_uniform_factors_on_a_random_subset() -> None:
     factors = draw_edit(4000, 8, torch.Generator().manual_seed(3), "cpu")
     assert factors.shape == (4000, 8)

@@ -119,6 +119,51 @@ def test_terms_can_be_left_out(small_config: Config, realistic: RealisticShapes)
     assert set(alone.train_step()) == {"loss", "sem", "rec", "sem_edit", "rec_edit"}
 
 
+@pytest.mark.parametrize("law", ["set", "cycle"])
+def test_other_laws_of_edits_train_and_resume(
+    small_config: Config, tmp_path: Path, law: str
+) -> None:
+    config = replace(small_config, edit=law)
+    whole, first, second = (Trainer(config, None) for _ in range(3))
+    expected = [whole.train_step() for _ in range(4)]
+    assert set(expected[0]) == {"loss", "sem", "rec", "sem_edit", "rec_edit"}
+    plain = Trainer(small_config, None).train_step()
+    assert plain["sem"] == expected[0]["sem"]
+    assert plain["sem_edit"] != expected[0]["sem_edit"]
+    steps = [first.train_step() for _ in range(2)]
+    second.restore(first.state())
+    assert [*steps, *(second.train_step() for _ in range(2))] == expected
+
+
+def test_clouds_of_predictions_leave_the_running_statistics_alone(small_config: Config) -> None:
+    trainer = Trainer(small_config, None)
+    trainer.encoder.train()
+    clouds = trainer.synthetic.batch(8, 64).points
+    before = {name: value.clone() for name, value in trainer.encoder.named_buffers()}
+    trainer._encode_again(clouds)
+    for name, value in trainer.encoder.named_buffers():
+        if "num_batches" not in name:
+            assert torch.equal(value, before[name]), name
+    trainer._encode(clouds)
+    means = [name for name in before if "running_mean" in name]
+    assert all(
+        not torch.equal(dict(trainer.encoder.named_buffers())[name], before[name]) for name in means
+    )
+
+
+def test_the_similarity_loss_sees_as_many_points_as_are_set(
+    small_config: Config, realistic: RealisticShapes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trainer = Trainer(replace(small_config, similarity_points=20), realistic)
+    seen = []
+    similarity = trainer.losses.similarity
+    monkeypatch.setattr(
+        trainer.losses, "similarity", lambda *a: (seen.append(a[2]), similarity(*a))[1]
+    )
+    trainer.train_step()
+    assert seen == [20]
+
+
 def test_the_learning_rate_is_kept_or_decays_along_a_cosine(small_config: Config) -> None:
     def rates(config: Config) -> list[float]:
         trainer = Trainer(config, None)
