@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from model_export.losses import Weights
+from model_export.losses import EDITS, NORMS, Weights
 from model_export.synthetic import Augmentation
 from service.encode.model import SHIPPED as SHIPPED
 from service.template.loader import load_template
@@ -34,6 +34,9 @@ class Config:
         head: hidden widths after it; None is the paper's.
         keypoints: how many the encoder attends to; None is the paper's, a maximum over features.
         editing: use the editing branch.
+        edit: what it compares, of `losses.EDITS`.
+        norm: of the semantic loss, of `losses.NORMS`.
+        similarity_points: most samples of a real cloud, and those of a template, that L_sim sees.
         weights: of the losses.
         augmentation: of synthetic clouds.
         log_share: share of synthetic shapes drawn evenly in the logarithm.
@@ -54,10 +57,19 @@ class Config:
     head: tuple[int, ...] | None = None
     keypoints: int | None = None
     editing: bool = True
+    edit: str = "multiply"
+    norm: str = "l2"
+    similarity_points: int = 768
     weights: Weights = field(default_factory=Weights)
     augmentation: Augmentation = field(default_factory=Augmentation)
     log_share: float = 0.0
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, choices in (("edit", EDITS), ("norm", NORMS)):
+            if getattr(self, name) not in choices:
+                raise ValueError(f"{name} is one of {', '.join(choices)}, "
+                    f"not {getattr(self, name)!r}")  # fmt: skip
 
 
 FULL, QUICK = "chair", "quick"

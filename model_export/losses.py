@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -11,7 +12,13 @@ from torch.nn import functional
 from model_export.sampling import face_areas, sample_faces
 from model_export.synthetic import Batch, present_parts
 from service.encode.model import STEEPNESS
+from service.mesh.surface import RADIUS
 from service.template.affine import AffineTemplate
+
+EDITS = ("multiply", "set", "cycle")
+"""What the editing branch compares, see `Losses.branch`."""
+NORMS = ("l2", "l1")
+"""Of the semantic loss: the mean of squares, or of absolute values."""
 
 
 @dataclass(frozen=True)
@@ -38,14 +45,23 @@ class Losses:
     """
 
     def __init__(
-        self, template: AffineTemplate, spread: Tensor, device: torch.device | str = "cpu"
+        self,
+        template: AffineTemplate,
+        spread: Tensor,
+        device: torch.device | str = "cpu",
+        *,
+        edit: str = "multiply",
+        norm: str = "l2",
     ) -> None:
         """
         Args:
             template: decodes parameters.
             spread: ``[d + 3]`` standard deviations of the labels; L_sem is measured in them.
             device: where the arrays live.
+            edit: of `EDITS`.
+            norm: of `NORMS`.
         """
+        self.law, self.norm = edit, norm
         self.size = len(template.parameters)
         self.spread = spread[: self.size + 3]
         self.jacobian = torch.as_tensor(template.jacobian, dtype=torch.float32, device=device)
@@ -67,11 +83,13 @@ class Losses:
     def semantic(self, predicted: Tensor, true: Tensor, variant: Tensor) -> Tensor:
         """L_sem: mean square over parameters and translation, in standard deviations.
 
-        Parameters that are idle in a shape's variant don't count.
+        Parameters that are idle in a shape's variant don't count.  With the norm ``l1`` the mean
+        absolute value.
         """
         active = self.active[variant]
         gap = (predicted[:, : self.size + 3] - true) / self.spread
-        return (active * gap.square()).sum() / active.sum()
+        cost = gap.square() if self.norm == "l2" else gap.abs()
+        return (active * cost).sum() / active.sum()
 
     def reconstruction(self, predicted: Tensor, true: Tensor, variant: Tensor) -> Tensor:
         """L_rec: mean squared distance between corresponding vertices of the variants' parts."""
@@ -80,7 +98,11 @@ class Losses:
         return ((present * gap).sum(dim=1) / present.sum(dim=1)).mean()
 
     def synthetic(
-        self, predicted: Tensor, batch: Batch, factors: Tensor | None
+        self,
+        predicted: Tensor,
+        batch: Batch,
+        factors: Tensor | None,
+        encode: Callable[[Tensor], Tensor] | None = None,
     ) -> dict[str, Tensor]:
         """All supervised terms.
 
@@ -88,6 +110,7 @@ class Losses:
             predicted: ``[B, d + 3 (+ K)]`` outputs.
             batch: the labels.
             factors: ``[B, d]`` the editing branch's target edit, or None without that branch.
+            encode: ``[B, n, 3]`` clouds to outputs, for the edits that are encoded again.
         """
         true, variant = batch.labels, batch.variant
         terms = {
@@ -95,7 +118,7 @@ class Losses:
             "rec": self.reconstruction(predicted, true, variant),
         }
         if factors is not None:
-            edited, target = self.edit(predicted, factors), self.edit(true, factors)
+            edited, target = self.branch(predicted, batch, factors, encode)
             terms["sem_edit"] = self.semantic(edited, target, variant)
             terms["rec_edit"] = self.reconstruction(edited, target, variant)
         if len(self.present) > 1:
@@ -109,6 +132,36 @@ class Losses:
     def edit(self, outputs: Tensor, factors: Tensor) -> Tensor:
         """Parameters times their factors, translation kept."""
         return torch.cat([outputs[:, : self.size] * factors, outputs[:, self.size :]], dim=1)
+
+    def branch(
+        self,
+        predicted: Tensor,
+        batch: Batch,
+        factors: Tensor,
+        encode: Callable[[Tensor], Tensor] | None,
+    ) -> tuple[Tensor, Tensor]:
+        """What the editing branch compares: edited outputs, and what they should be.
+
+        ``multiply``: both times the same factors.  ``set``: what the edit changes is set to the
+        true edited value, so that only the other parameters can be off.  ``cycle``: the edited
+        prediction is decoded, sampled and encoded again, and should be told as the truth edited.
+        """
+        edited, target = self.edit(predicted, factors), self.edit(batch.labels, factors)
+        if self.law == "multiply":
+            return edited, target
+        if self.law == "set":
+            kept = functional.pad(factors == 1.0, (0, edited.shape[1] - self.size), value=True)
+            own = torch.cat([target, edited[:, self.size + 3 :]], dim=1)
+            return torch.where(kept, edited, own), target
+        assert encode is not None
+        vertices = self.decode(edited)
+        weight = face_areas(vertices, self.faces).detach() * self.face_present[batch.variant]
+        points = sample_faces(vertices, self.faces, weight, batch.points.shape[1])[0]
+        center = points.mean(dim=1, keepdim=True)
+        scale = RADIUS / (points - center).norm(dim=2).amax(dim=1)
+        moved = target[:, self.size :] - center[:, 0]
+        target = torch.cat([target[:, : self.size], moved], dim=1) * scale[:, None]
+        return encode((points - center) * scale[:, None, None]), target.detach()
 
     def similarity(self, predicted: Tensor, clouds: Tensor, points: int = 768) -> Tensor:
         """L_sim: two-way squared chamfer distance between samples of template and cloud.

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from model_export.config import Config, config_of
 from model_export.labels import label_statistics, require_scale_free
@@ -69,7 +69,9 @@ class Trainer(Run):
         shape = config.shared, config.head, config.keypoints
         self.encoder = build_encoder(mean, spread, *shape).to(self.device)
         self.forward = torch.compile(self.encoder, dynamic=True) if compiled else self.encoder
-        self.losses = Losses(self.template, spread.to(self.device), self.device)
+        self.losses = Losses(
+            self.template, spread.to(self.device), self.device, edit=config.edit, norm=config.norm
+        )
         self.optimizer = torch.optim.Adam(
             self.encoder.parameters(), config.learning_rate, fused=self.device.type == "cuda"
         )
@@ -83,9 +85,7 @@ class Trainer(Run):
         drawn = self._next()
         clouds = torch.cat([drawn.batch.points, drawn.real])
         self.encoder.train()
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=config.precision == "bf16"):
-            outputs = self.forward(clouds)
-        terms = self._terms(outputs.float(), drawn)
+        terms = self._terms(self._encode(clouds), drawn)
         loss = total(terms, config.weights)
         self.optimizer.zero_grad()
         loss.backward()
@@ -93,12 +93,30 @@ class Trainer(Run):
         self.step += 1
         return {"loss": loss, **terms}
 
+    def _encode(self, clouds: Tensor) -> Tensor:
+        half = self.config.precision == "bf16"
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=half):
+            outputs: Tensor = self.forward(clouds)
+        return outputs.float()
+
+    def _encode_again(self, clouds: Tensor) -> Tensor:
+        """Outputs for clouds of predictions, which are not to enter the running statistics."""
+        norms = [layer for layer in self.encoder.modules() if isinstance(layer, nn.BatchNorm1d)]
+        kept = [(norm, norm.momentum) for norm in norms]
+        for norm in norms:
+            norm.momentum = 0.0
+        outputs = self._encode(clouds)
+        for norm, momentum in kept:
+            norm.momentum = momentum
+        return outputs
+
     def _terms(self, outputs: Tensor, drawn: Drawn) -> dict[str, Tensor]:
         count = len(drawn.batch.points)
         factors = drawn.factors if self.config.editing else None
-        terms = self.losses.synthetic(outputs[:count], drawn.batch, factors)
+        terms = self.losses.synthetic(outputs[:count], drawn.batch, factors, self._encode_again)
         if len(drawn.real) and self.config.weights.gamma:
-            terms["sim"] = self.losses.similarity(outputs[count:], drawn.real)
+            points = self.config.similarity_points
+            terms["sim"] = self.losses.similarity(outputs[count:], drawn.real, points)
         return terms
 
     def _next(self) -> Drawn:
