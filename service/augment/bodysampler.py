@@ -16,7 +16,7 @@ from service.template.skinned import NAMES, SHAPES
 
 Array = NDArray[np.float64]
 
-FARTHEST_TURN = np.radians(40.0)
+FARTHEST_TURN = np.radians(30.0)
 """By which a joint turns at most."""
 TYPICAL_TURN = np.radians(15.0)
 """Standard deviation of an angle where no real poses are known."""

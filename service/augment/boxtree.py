@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
 Index = NDArray[np.int64]
 
 FAN = 4
@@ -45,11 +46,13 @@ class BoxTree:
         pairs = self._order[np.stack([first[apart], second[apart]])]
         return np.sort(pairs, axis=0).T
 
-    def _levels(self, vertices: Array, reach: float) -> list[tuple[Array, Array]]:
+    def _levels(self, vertices: Array, reach: float) -> list[tuple[Array32, Array32]]:
         """Low and high ends ``[3, n]`` of the faces' boxes, and of the boxes above them."""
-        a, b, c = (vertices.T[:, corner] for corner in self._corners)
+        # In single precision, which is finer than whatever is asked of what lies in the boxes.
+        columns = np.ascontiguousarray(vertices.T, np.float32)
+        a, b, c = (columns[:, corner] for corner in self._corners)
         low = np.minimum(np.minimum(a, b), c)
-        high = np.maximum(np.maximum(a, b), c) + reach
+        high = np.maximum(np.maximum(a, b), c) + np.float32(reach)
         levels = [(low, high)]
         while low.shape[1] > TOP:
             starts = np.arange(0, low.shape[1], FAN)
@@ -79,7 +82,7 @@ def _children(first: Index, second: Index, count: int) -> tuple[Index, Index]:
     return a[there], b[there]
 
 
-def _overlapping(level: tuple[Array, Array], a: Index, b: Index) -> tuple[Index, Index]:
+def _overlapping(level: tuple[Array32, Array32], a: Index, b: Index) -> tuple[Index, Index]:
     """The pairs whose boxes overlap."""
     for low, high in zip(*level, strict=True):
         meet = (low[a] <= high[b]) & (low[b] <= high[a])

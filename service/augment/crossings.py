@@ -41,7 +41,7 @@ class Crossings:
 
 
 def _planes(corners: Array) -> tuple[Array, Array]:
-    """Unit normals ``[3, F]`` and offsets ``[F]`` of faces with ``corners [3, 3, F]``, axis first."""
+    """Unit normals ``[3, F]`` and offsets ``[F]`` of faces with ``corners [3, 3, F]``."""
     a, b, c = corners.transpose(1, 0, 2)
     normals = np.cross(b - a, c - a, axis=0)
     normals /= np.maximum(np.linalg.norm(normals, axis=0), np.finfo(float).tiny)
