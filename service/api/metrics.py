@@ -83,7 +83,7 @@ class Metrics:
         self._inferences = self._counter(
             "inferences", "Meshes inferred by /infer.", "category", "in_distribution"
         )
-        self._edits = self._counter("edits", "Meshes edited by /edit.", "category")
+        self._edits = self._counter("edits", "Meshes edited by /edit and /transfer.", "category")
         self._flips = self._counter("flipped_faces", "Faces that edits turned over.", "category")
         self._warnings = self._counter("edit_warnings", "Warnings in reports of edits.", "category")
         for stage in STAGES:
