@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -331,3 +332,21 @@ def test_values_that_are_equal_but_for_rounding_are_no_change() -> None:
     assert {name: change.amount for name, change in edits.items()} == {
         "a": present["a"], "b": 0.5 + 1e-6, "c": 0.0
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("capacity", [0, 1 << 28])
+def test_transfers_both_ways_at_once_wait_for_no_end(
+    source: Upload, target: Upload, models: dict[str, Model], capacity: int
+) -> None:
+    known, quick = Inferences(capacity), replace(UPRIGHT, refine=False)
+
+    def work(pair: tuple[Upload, Upload]) -> bytes:
+        return transfer(*pair, models, quick, quick, TransferOptions(), known).data
+
+    pairs = [(source, target), (target, source), (source, source), (target, target)]
+    with ThreadPoolExecutor(len(pairs)) as pool:
+        answers = [pool.submit(work, pair) for pair in pairs]
+        there, back, one, two = (answer.result(timeout=60) for answer in answers)
+    assert (one, two) == (source.data, target.data)
+    assert there != source.data
+    assert back != target.data
