@@ -1,0 +1,205 @@
+"""How a call is carried out, free of input and output.
+
+Each function here is a generator that yields steps; a client carries each out, blocking or not, and
+sends back what comes of it or throws in httpx's error.  So both clients decide alike.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import httpx
+
+from service.client.call import Answer, Call, Part
+from service.client.config import Config
+from service.client.errors import (
+    AnswerMalformed,
+    ConnectionFailed,
+    MeshUnknown,
+    ServiceError,
+    TimedOut,
+    problem,
+)
+from service.client.multipart import Field, Multipart
+from service.client.retry import Attempts
+from service.client.sink import Sink
+
+T = TypeVar("T")
+
+EXCERPT = 200
+
+
+@dataclass(frozen=True)
+class Send:
+    """Close the response before, send this, and give back its response, the body not yet read."""
+
+    request: httpx.Request
+
+
+@dataclass(frozen=True)
+class Read:
+    """Read all of the body into the sink, and close the response."""
+
+    response: httpx.Response
+    sink: Sink
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Give back the next piece of the body, None at its end."""
+
+    response: httpx.Response
+
+
+@dataclass(frozen=True)
+class Sleep:
+    """Wait so many seconds."""
+
+    seconds: float
+
+
+Step = Send | Read | Chunk | Sleep
+Steps = Generator[Step, Any, T]
+
+
+def exchange(call: Call[T], config: Config) -> Steps[T]:
+    """Make the call, again where that helps, and read its answer.
+
+    Raises:
+        ServiceError: as the tree in `errors` says.
+        OSError: when a file can't be read or written.
+    """
+    attempts = Attempts(call.how.retry or config.retry)
+    whole = False
+    while True:
+        try:
+            return (yield from _attempt(call, config, whole))
+        except MeshUnknown:
+            # The service holds it no more.  Once sent whole, another such answer is final.
+            if whole or not _can_send(call.parts):
+                raise
+            whole = True
+            for part in call.parts:
+                if part.by_id and part.mesh.has_content:
+                    part.mesh.forget()
+        except ServiceError as fault:
+            yield Sleep(attempts.delay(fault))
+
+
+def _attempt(call: Call[T], config: Config, whole: bool) -> Steps[T]:
+    request = request_of(call, config, whole)
+    with translated(request):
+        response: httpx.Response = yield Send(request)
+    if not response.is_success:
+        raise (yield from refusal(response, config))
+    sink = Sink(call.how.to, call.how.download_progress, _length(response))
+    try:
+        with translated(request):
+            yield Read(response, sink)
+    except BaseException:
+        sink.abort()
+        raise
+    sent = tuple(part.mesh for part in call.parts)
+    answer = Answer(response.status_code, response.headers, sink.content, call.how.to, sent)
+    try:
+        return call.read(answer)
+    except ValueError as error:
+        what = f"the answer can't be read: {str(error).splitlines()[0]}"
+        raise malformed(what, response, sink.content or b"") from error
+
+
+def refusal(response: httpx.Response, config: Config) -> Generator[Step, Any, ServiceError]:
+    """The exception that an answer other than a success stands for."""
+    sink = Sink()
+    with translated(response.request):
+        yield Read(response, sink)
+    body = sink.content or b""
+    retry_after = config.retry.after(response.headers.get("retry-after"))
+    try:
+        document = json.loads(body)
+    except ValueError:
+        document = None
+    told = problem(document, response.status_code, retry_after)
+    if told is not None:
+        return told
+    if response.is_redirect:
+        return malformed("a redirect, which is not followed,", response, b"", retry_after)
+    return malformed("an answer that is no problem document", response, body, retry_after)
+
+
+def request_of(call: Call[Any], config: Config, whole: bool = False) -> httpx.Request:
+    """The request.
+
+    Args:
+        call: what is called.
+        config: where, by whom, and how.
+        whole: whether to send meshes whose id is known.
+
+    Raises:
+        OSError: when a file can't be read.
+    """
+    url = httpx.URL(config.url + call.path)
+    headers = {"Host": url.netloc.decode("ascii"), **config.headers(), **call.headers}
+    stream = None
+    if call.method == "POST":
+        stream = _form(call, whole)
+        headers["Content-Type"] = stream.content_type
+        headers["Content-Length"] = str(stream.length)
+    timeout = config.timeout if call.how.timeout is None else httpx.Timeout(call.how.timeout)
+    return httpx.Request(
+        call.method,
+        url,
+        headers=headers,
+        stream=stream,
+        extensions={"timeout": timeout.as_dict()},
+    )
+
+
+def malformed(
+    what: str, response: httpx.Response, body: bytes, retry_after: float | None = None
+) -> AnswerMalformed:
+    """The exception for an answer that is not the service's."""
+    excerpt = body[:EXCERPT].decode("utf-8", "replace")
+    media_type = response.headers.get("content-type", "")
+    return AnswerMalformed(what, response.status_code, media_type, excerpt, retry_after)
+
+
+@contextmanager
+def translated(request: httpx.Request) -> Iterator[None]:
+    """Turn httpx's errors into the client's."""
+    where = f"{request.method} {request.url.copy_with(userinfo=b'', query=None)}"
+    try:
+        yield
+    except httpx.TimeoutException as error:
+        kind = type(error).__name__.removesuffix("Timeout").lower()
+        raise TimedOut(f"{where}: no answer in time ({kind})") from error
+    except httpx.UnsupportedProtocol as error:
+        raise ValueError(f"{where}: {error}") from error
+    except httpx.HTTPError as error:
+        raise ConnectionFailed(f"{where}: {error or type(error).__name__}") from error
+
+
+def _form(call: Call[Any], whole: bool) -> Multipart:
+    texts: list[Field] = list(call.fields)
+    files = []
+    for part in call.parts:
+        known = part.mesh.mesh_id
+        if part.by_id and known and not (whole and part.mesh.has_content):
+            texts.append((part.by_id, known))
+        else:
+            files.append((part.name, part.mesh))
+    return Multipart(texts, files, call.how.progress)
+
+
+def _can_send(parts: tuple[Part, ...]) -> bool:
+    return any(p.by_id and p.mesh.mesh_id and p.mesh.has_content for p in parts)
+
+
+def _length(response: httpx.Response) -> int | None:
+    told = response.headers.get("content-length", "")
+    encoded = "content-encoding" in response.headers
+    return int(told) if told.isdecimal() and not encoded else None
