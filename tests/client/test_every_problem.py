@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 from provoke import BOX, PROVOKED, client_of, refused
-from provoke_codes import Source
+from provoke_codes import Codes
+from provoke_source import Source
 
 from service.client import ShapeClient
 from service.main import create_app
@@ -47,7 +48,7 @@ UNREACHED = {
 @pytest.fixture(scope="module")
 def codes() -> frozenset[str]:
     """All that there are."""
-    return frozenset(Source().codes())
+    return frozenset(Codes(Source()).found())
 
 
 @pytest.fixture(scope="module")

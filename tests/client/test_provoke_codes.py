@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from provoke_codes import Source
+from provoke_codes import Codes
+from provoke_source import Source
 
 ERRORS = """
 class ShapeError(Exception):
@@ -22,7 +23,7 @@ def codes(folder: Path, text: str) -> set[str]:
     (service / "errors.py").write_text(ERRORS, "utf-8")
     (service / "nouns.py").write_text(f"from service.errors import Gone\n{text}", "utf-8")
     (service / "else.py").write_text('raise NotFound("elsewhere", "b")', "utf-8")
-    return set(Source(folder, ["service/nouns.py"]).codes())
+    return set(Codes(Source(folder, ["service/nouns.py"])).found())
 
 
 @pytest.mark.parametrize(
@@ -49,6 +50,12 @@ def codes(folder: Path, text: str) -> set[str]:
             'def g(n):\n    return ("a", "x") if n else ("b", "y")\n'
             "def f():\n    code, detail = g(1)\n    raise Gone(code, detail)",
             {"a", "b"},
+        ),
+        (
+            "class Failure:\n    name: str\n    code: str\n"
+            'def f(error):\n    own = error.code, error.detail\n    Failure("x", *own)\n'
+            'Failure("x", "a")',
+            {"a"},
         ),
         ("def f(error):\n    raise NotFound(error.code, error.detail)", set()),
     ],
