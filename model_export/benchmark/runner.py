@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import signal
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -15,8 +17,12 @@ from typing import Any
 from model_export.benchmark.case import Case
 from model_export.benchmark.score import Judge
 from model_export.rivals.registry import Entry
+from model_export.rivals.subject import Edit
 
 Row = dict[str, Any]
+
+GRACE = 10.0
+"""Seconds after its limit that a process of its own is stopped."""
 
 
 class Results:
@@ -88,17 +94,16 @@ def run_case(
             }
             if not results.has(row):
                 say(f"{case.source} {case.name}: {name}, {row['known']}")
-                results.add(row | _measured(case, known, rival, judge))
+                measure = _measured_apart if rival.apart else _measured
+                results.add(row | measure(case, known, rival, judge))
 
 
 def _measured(case: Case, known: str, rival: Entry, judge: Judge) -> Row:
     """Scores of all edits, and what went wrong."""
     began = time.monotonic()
-    edits, scores, failure = list(case.edits(known)), [], None
-    if rival.makes_anew:
-        # What takes seconds is asked for one factor alone.
-        edits = edits[1::2]
-    bound = 0.0
+    edits = _edits(case, known, rival)
+    scores: list[Row] = []
+    failure, bound = None, 0.0
     try:
         with time_limit(rival.limit):
             editor = rival.rule(case.subject(known))
@@ -109,11 +114,53 @@ def _measured(case: Case, known: str, rival: Entry, judge: Judge) -> Row:
     except Exception as error:
         # Whatever a library does to such a mesh is a finding, not the end of the run.
         failure = f"{type(error).__name__}: {error}"[:200]
+    return _row(case, edits, bound, time.monotonic() - began, failure, scores)
+
+
+def _measured_apart(case: Case, known: str, rival: Entry, judge: Judge) -> Row:
+    """The same in a process of its own: a crash is a failure like others."""
+    began = time.monotonic()
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+
+    def work() -> None:
+        sender.send(_measured(case, known, rival, judge))
+
+    process = context.Process(target=work)
+    with warnings.catch_warnings():
+        # Other threads of this process are idle.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process.start()
+    sender.close()
+    try:
+        if receiver.poll(rival.limit + GRACE):
+            return dict(receiver.recv())
+        failure = f"TimeoutError: took longer than {rival.limit:g} s"
+    except EOFError:
+        process.join()
+        failure = f"crashed: exit code {process.exitcode}"
+    finally:
+        process.kill()
+        process.join()
+        receiver.close()
+    return _row(case, _edits(case, known, rival), 0.0, time.monotonic() - began, failure, [])
+
+
+def _edits(case: Case, known: str, rival: Entry) -> list[Edit]:
+    edits = list(case.edits(known))
+    # What takes seconds is asked for one factor alone.
+    return edits[1::2] if rival.makes_anew else edits
+
+
+def _row(
+    case: Case, edits: list[Edit], bound: float, seconds: float, failure: str | None,
+    scores: list[Row],
+) -> Row:  # fmt: skip
     return {
         "vertices": len(case.vertices),
         "edits": len(edits),
         "bound_s": round(bound, 3),
-        "seconds": round(time.monotonic() - began, 3),
+        "seconds": round(seconds, 3),
         "failure": failure,
         "scores": scores,
     }

@@ -22,6 +22,7 @@ class Entry:
         knows_truth: it is shown the true edit and gives a bound; parameters are nothing to it.
         makes_anew: the mesh that it answers with is another.
         limit: seconds for one mesh, binding and all edits.
+        apart: it runs in a process of its own, as its library may crash or not come back.
         slow: it is left out of quick runs.
         most: inputs of a source that it is asked for, where that takes long.
     """
@@ -30,6 +31,7 @@ class Entry:
     knows_truth: bool = False
     makes_anew: bool = False
     limit: float = 120.0
+    apart: bool = False
     slow: bool = False
     most: int | None = None
 
@@ -39,9 +41,9 @@ RIVALS: dict[str, Entry] = {
     "nine-slice": Entry(nine_slice),
     "cage (bound)": Entry(caged, knows_truth=True),
     "re-synthesis (bound)": Entry(
-        resynthesised, knows_truth=True, makes_anew=True, slow=True, most=4
+        resynthesised, knows_truth=True, makes_anew=True, apart=True, slow=True, most=4
     ),
-    "as-rigid-as-possible": Entry(as_rigid_as_possible, slow=True),
+    "as-rigid-as-possible": Entry(as_rigid_as_possible, apart=True, slow=True),
     "radial basis": Entry(radial),
     "paper, k = 1": Entry(paper_rule(1)),
     "paper, k = 8": Entry(paper_rule(8)),

@@ -16,8 +16,9 @@ def as_rigid_as_possible(subject: Subject) -> Editor:
     the rest follows as rigidly as it can (Sorkine and Alexa, 2007)."""
     import igl
 
-    vertices = np.ascontiguousarray(subject.vertices)
-    faces = np.ascontiguousarray(subject.faces)
+    used, corners = np.unique(subject.faces, return_inverse=True)
+    vertices = np.ascontiguousarray(subject.vertices[used])
+    faces = np.ascontiguousarray(corners.reshape(-1, 3))
     handles = spread(vertices, HANDLES)
     _, nearest = cKDTree(subject.fitted).query(vertices[handles])
     data = igl.ARAPData()
@@ -26,8 +27,9 @@ def as_rigid_as_possible(subject: Subject) -> Editor:
 
     def edit(change: Edit) -> Outcome:
         moved = subject.template.jacobian[nearest, :, change.index] * change.df[change.index]
-        held = vertices[handles] + moved
-        return Outcome(igl.arap_solve(held, data, vertices))
+        found = subject.vertices.copy()
+        found[used] = igl.arap_solve(vertices[handles] + moved, data, vertices)
+        return Outcome(found)
 
     return edit
 

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
 import time
 from pathlib import Path
@@ -130,6 +132,22 @@ def test_a_failure_is_written_down_and_the_run_goes_on(chair: Case, tmp_path: Pa
     text = table(rows, TRUTH)
     assert "3 of 3: RuntimeError: precomputation failed" in text
     assert "| chair 1 |" in worst(rows, "blend", "true")
+
+
+def crash(subject: Subject) -> Editor:
+    os.kill(os.getpid(), signal.SIGSEGV)
+    raise AssertionError
+
+
+def test_a_library_that_crashes_does_not_take_the_run_with_it(chair: Case, tmp_path: Path) -> None:
+    rows = run(
+        chair, tmp_path / "r.jsonl",
+        crash=Entry(crash, apart=True), blend=Entry(RIVALS["blend"].rule, apart=True),
+    )  # fmt: skip
+    own = {row["rival"]: row for row in rows if row["known"] == "true"}
+    assert own["crash"]["failure"] == "crashed: exit code -11"
+    assert own["crash"]["edits"] == len(own["blend"]["scores"]) == 16
+    assert own["blend"]["failure"] is None
 
 
 def test_what_takes_too_long_is_stopped() -> None:
