@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
@@ -33,7 +34,16 @@ def parse_edits(text: str) -> dict[str, Change]:
     Raises:
         InvalidRequest: when the text is not JSON, or not an object of names and changes.
     """
-    return {name: _change(name, entry) for name, entry in read_entries(text, "edits", FORM).items()}
+    return changes(read_entries(text, "edits", FORM))
+
+
+def changes(entries: Mapping[str, Any]) -> dict[str, Change]:
+    """What an edits object says.
+
+    Raises:
+        InvalidRequest: ``edit_malformed``, for what is no change.
+    """
+    return {name: _change(name, entry) for name, entry in entries.items()}
 
 
 def _change(name: str, entry: Any) -> Change:

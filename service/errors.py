@@ -6,8 +6,10 @@
     |- TooLarge             over a limit on bytes, vertices or faces
     |- TooComplex           more work than one request may make
     |- InvalidRequest       an option, parameter name or edit value that makes no sense
-    |- NotFound             no such category or stored mesh
+    |- NotFound             no such category, stored mesh or job
+    |- Conflict             it does not go with what there is already
     |- Overloaded           others' work left no time for this; later it may
+    |- Crowded              there is no room for one more; later there may be
     `- ModelFault           an installed model that can't be trusted
 
 Each error carries a stable `code` (snake_case, part of the API), a `detail` that names what was
@@ -56,6 +58,14 @@ class InvalidRequest(ShapeError):
 
 class NotFound(ShapeError):
     """There is no such thing here."""
+
+
+class Conflict(ShapeError):
+    """What is asked does not go with what there is already."""
+
+
+class Crowded(ShapeError):
+    """There is no room for one more; the same request may pass later."""
 
 
 class Overloaded(ShapeError):

@@ -16,10 +16,13 @@ from threadpoolctl import threadpool_limits
 
 from service import malloc
 from service.api import (
+    augment,
     categories,
     edit,
+    events,
     form_limits,
     infer,
+    jobs,
     meshes,
     openapi,
     probes,
@@ -51,16 +54,22 @@ from service.api.routes import Routes
 from service.api.safety import SafetyHeaders
 from service.api.tracing import TELEMETRY
 from service.api.workers import Workers
-from service.budget import Budget
+from service.budget import MEBIBYTE, Budget
 from service.encode.catalog import Catalog
 from service.encode.installed import Installed
 from service.encode.model import SHIPPED, load_models
 from service.inferences import Inferences
+from service.jobs.jobs import Jobs
+from service.jobs.runner import Runner, Surroundings
+from service.jobs.store import Bounds, JobStore
 from service.origins import ALL
 from service.settings import Settings
 from service.store.meshstore import MeshStore, open_store
 
 TRIM_EVERY_S = 10.0
+JOBS_FOLDER = "jobs"
+JOBS_BYTES = 1024 * MEBIBYTE
+"""On a disk, by default."""
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -110,9 +119,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Pieces)
     app.add_middleware(Linger)  # added last: outermost
     problems.install(app)
-    for noun in (infer, edit, sliders, transfer):
+    for noun in (infer, edit, sliders, transfer, augment):
         app.include_router(noun.router, responses=problems.documented(401, 403))
-    for noun in (categories, meshes):
+    for noun in (categories, meshes, jobs, events):
         app.include_router(noun.router, responses=problems.documented(401))
     for noun in (probes, scrape, viewer):
         app.include_router(noun.router)
@@ -132,9 +141,11 @@ def _context(settings: Settings) -> Context:
     meshes_held = budget.share(settings.mesh_cache_bytes)
     inferences_held = budget.share(settings.inference_cache_bytes)
     bodies_held = budget.share(settings.max_pending_bytes)
-    vertices = settings.max_vertices or budget.vertices(
-        workers, meshes_held + inferences_held + bodies_held
-    )
+    held = meshes_held + inferences_held + bodies_held
+    job_store = _job_store(settings, budget)
+    if not job_store.durable:
+        held += job_store.bounds.bytes
+    vertices = settings.max_vertices or budget.vertices(workers, held)
     pool = Workers(workers, settings.deadline_seconds, vertices)
     queue = max(1, workers // 2) if settings.queue is None else settings.queue
     admission = Admission(pool, queue, bodies_held)
@@ -147,7 +158,25 @@ def _context(settings: Settings) -> Context:
         return installed
 
     readiness = Readiness(load)
-    return Context(_store(settings, meshes_held), inferences, readiness, pool, admission, Metrics())
+    around = Surroundings(
+        lambda: readiness.installed.named,
+        inferences,
+        settings.deadline_seconds,
+        vertices,
+        lambda: pool.queued > 0 or pool.working >= pool.count,
+        lambda: readiness.draining,
+    )
+    kept = _store(settings, meshes_held)
+    jobs = Jobs(job_store, Runner(job_store, around))
+    return Context(kept, inferences, readiness, pool, admission, Metrics(), jobs)
+
+
+def _job_store(settings: Settings, budget: Budget) -> JobStore:
+    folder = settings.jobs_dir
+    if folder is None and settings.store_dir is not None:
+        folder = settings.store_dir / JOBS_FOLDER
+    most = settings.jobs_bytes or (budget.share(None) if folder is None else JOBS_BYTES)
+    return JobStore(folder, Bounds(settings.jobs, most, settings.job_seconds))
 
 
 def _freeze() -> None:
@@ -173,7 +202,10 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         if can_listen():
             tasks.start_soon(reload_on_hangup, context.readiness, app.state.keys)
         tasks.start_soon(_trim_after_work, context.workers)
+        if context.jobs.store.durable:
+            context.jobs.start()
         yield
+        await anyio.to_thread.run_sync(context.jobs.close)
         context.store.close()
         tasks.cancel_scope.cancel()
 

@@ -21,22 +21,31 @@ def read_entries(text: str, field: str, form: str) -> dict[str, Any]:
     Raises:
         InvalidRequest: when the text is not JSON, or not an object.
     """
+    entries = read_json(text, field, form)
+    if not isinstance(entries, dict):
+        fault = f"{field} is a {kind_of(entries)}, not an object"
+        raise InvalidRequest(f"{field}_not_object", fault, form)
+    return entries
+
+
+def read_json(text: str, field: str, form: str) -> Any:
+    """A field's JSON, in which no name stands twice in one object.
+
+    Raises:
+        InvalidRequest: ``<field>_not_json``.
+    """
     try:
-        entries = json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique)
+        return json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique)
     except (ValueError, RecursionError) as error:
         raise InvalidRequest(
             f"{field}_not_json", f"{field} can't be read: {error}", form
         ) from error
-    if not isinstance(entries, dict):
-        fault = f"{field} is a {_kind_of(entries)}, not an object"
-        raise InvalidRequest(f"{field}_not_object", fault, form)
-    return entries
 
 
 def number_fault(value: Any) -> str | None:
     """What keeps an entry's value from being a number of sensible size; None if nothing does."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        return f"is a {_kind_of(value)}, not a number"
+        return f"is a {kind_of(value)}, not a number"
     if not abs(value) < 1e12 or not math.isfinite(value):
         return "is not a finite number of sensible size"
     return None
@@ -53,7 +62,8 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return entries
 
 
-def _kind_of(value: Any) -> str:
+def kind_of(value: Any) -> str:
+    """What JSON calls a value."""
     names = {dict: "object", list: "list", str: "text", bool: "truth value", type(None): "null"}
     return names.get(type(value), "number")
 

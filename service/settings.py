@@ -90,6 +90,23 @@ class Settings(BaseSettings):
     """Where replicas share the same meshes, in fsspec's terms: `s3://bucket/prefix`,
     `file:///folder`; it needs the extra `shared`."""
 
+    jobs_dir: Path | None = None
+    """Folder for jobs - what clients ask for with `Prefer: respond-async` - which then outlive a
+    restart; several services of one machine may share it. By default STORE_DIR's `jobs`; without
+    either they are kept in memory."""
+
+    jobs: PositiveInt = 100
+    """Jobs that may be waiting or in work, half of them of one API key's owner; what comes beyond
+    is answered with 429."""
+
+    jobs_bytes: PositiveInt | None = None
+    """What jobs and their results may take, in bytes, half of it of one API key's owner; what does
+    not fit is answered with 429, or 413 if it never will. By default 1 GiB in a folder, and in
+    memory as for MESH_CACHE_BYTES."""
+
+    job_seconds: PositiveFloat = 86400.0
+    """How long a job and its result are kept after its end, in seconds."""
+
     api_keys: SecretStr = SecretStr("")
     """Whom to serve: `NAME:SHA256` of each API key, with commas or newlines between, as
     `python -m service.newkey NAME` prints it; without any, everyone is served."""

@@ -21,6 +21,10 @@ GIVEN = {
     "STORE_DIR": "/s",
     "STORE_BYTES": "7",
     "STORE_URL": "s3://bucket",
+    "JOBS_DIR": "/j",
+    "JOBS": "11",
+    "JOBS_BYTES": "12",
+    "JOB_SECONDS": "13",
     "API_KEYS": "a:0",
     "API_KEYS_FILE": "/k",
     "CORS_ORIGINS": "https://a.example, http://b.example:8080/",
@@ -56,6 +60,10 @@ def test_the_defaults_serve_this_machine_only() -> None:
     assert settings.store_dir is None
     assert settings.store_bytes == 1073741824
     assert settings.store_url is None
+    assert settings.jobs_dir is None
+    assert settings.jobs == 100
+    assert settings.jobs_bytes is None
+    assert settings.job_seconds == 86400
     assert settings.models_dir is None
     assert settings.body_model is None
     assert settings.categories == ("airplane", "chair", "human")
@@ -84,6 +92,10 @@ def test_the_environment_sets_them(monkeypatch: pytest.MonkeyPatch) -> None:
         store_dir=Path("/s"),
         store_bytes=7,
         store_url=SecretStr("s3://bucket"),
+        jobs_dir=Path("/j"),
+        jobs=11,
+        jobs_bytes=12,
+        job_seconds=13,
         api_keys=SecretStr("a:0"),
         api_keys_file=Path("/k"),
         cors_origins=("https://a.example", "http://b.example:8080"),

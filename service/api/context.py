@@ -12,12 +12,14 @@ from service.api.metrics import Metrics
 from service.api.readiness import Readiness
 from service.api.workers import Workers
 from service.inferences import Inferences
+from service.jobs.jobs import Jobs
 from service.store.meshstore import MeshStore
 
 
 @dataclass(frozen=True)
 class Context:
-    """The service's state: what is kept, loaded and measured, who works, and who is let in."""
+    """The service's state: what is kept, loaded and measured, who works, who is let in, and
+    what is worked on beside requests."""
 
     store: MeshStore
     inferences: Inferences
@@ -25,6 +27,7 @@ class Context:
     workers: Workers
     admission: Admission
     metrics: Metrics
+    jobs: Jobs
 
 
 def context_of(request: Request) -> Context:

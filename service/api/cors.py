@@ -10,10 +10,13 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.api.problems import Problem
 
-METHODS = ("GET", "HEAD", "POST")
+METHODS = ("DELETE", "GET", "HEAD", "POST")
 REQUEST_HEADERS = (
     "Authorization",
+    "Idempotency-Key",
     "If-None-Match",
+    "Last-Event-ID",
+    "Prefer",
     "X-API-Key",
     "X-Request-Id",
     "traceparent",
@@ -22,6 +25,8 @@ REQUEST_HEADERS = (
 ANSWER_HEADERS = (
     "Content-Disposition",
     "ETag",
+    "Location",
+    "Preference-Applied",
     "Retry-After",
     "Server-Timing",
     "Shape-Parameters",
@@ -60,7 +65,7 @@ class Cors(CORSMiddleware):
                         400,
                         "cors_refused",
                         f"A page of {asked['origin'][:80]!r} may not make this call: {refused}.",
-                        "The operator lets origins in by CORS_ORIGINS; calls are GET and POST.",
+                        "CORS_ORIGINS lets origins in; methods are GET, POST, DELETE.",
                         scope["state"]["trace_id"],
                         {"Vary": answer.headers["vary"]},
                     )

@@ -1,4 +1,4 @@
-"""POST /edit: the same file with its parameters changed."""
+"""POST /edit: the same file with its parameters changed, once or in many ways."""
 
 from __future__ import annotations
 
@@ -13,11 +13,17 @@ from service.api.asked import Asked, answered
 from service.api.context import Shared
 from service.api.edited_response import edited_response
 from service.api.forms import EditForm, form_content_type
+from service.api.prefer import IdempotencyKey, Prefer
 from service.api.problems import documented
 from service.api.schemas import EDITED_HEADERS, MESH_CONTENT, EditReport
+from service.api.several import ACCEPTED, several
 from service.constraints import NONE, parse_constraints
 from service.edited import Edited
 from service.edits import parse_edits
+from service.errors import InvalidRequest
+from service.jobs.order import Order
+from service.requests import Upload
+from service.variantedits import parse_variants
 
 router = APIRouter(tags=["shapes"])
 
@@ -38,26 +44,45 @@ router = APIRouter(tags=["shapes"])
     "Where they contradict each other the answer is a 422 with the code `constraints_conflict`, "
     "whose member `conflicts` names what comes nearest.\n\n"
     "With `Accept: application/json` it answers a report instead, and keeps the edited mesh for "
-    "`GET /meshes/{mesh_id}`.",
+    "`GET /meshes/{mesh_id}`.\n\n"
+    "With `variants` it answers a zip: an edited file for each, and a `manifest.jsonl` with a line "
+    "for each, which has a `problem` in place of a file for one that could not be made; with "
+    "`Prefer: respond-async` as well, a job makes the zip.",
     dependencies=[Depends(form_content_type)],
     response_class=Response,
     responses={
         200: {
-            "description": "The edited file, or the report of the edit.",
+            "description": "The edited file, the report of the edit, or the zip of all variants.",
             "model": EditReport,
             "content": MESH_CONTENT,
             "headers": EDITED_HEADERS,
         },
+        202: ACCEPTED,
         304: {"description": "The client's `If-None-Match` names the edited file."},
-        **documented(400, 404, 408, 413, 415, 422, 429, 500, 503),
+        **documented(400, 404, 408, 409, 413, 415, 422, 429, 500, 503),
     },
 )
 async def edit(
     request: Request,
     form: Annotated[EditForm, Form(media_type="multipart/form-data")],
     shared: Shared,
+    prefer: Prefer = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> Response:
+    if form.variants is not None:
+        return await several(request, form, shared, _order, idempotency_key)
     return await answered(request, form, shared, _edit)
+
+
+def _order(form: EditForm, upload: Upload) -> Order:
+    if form.edits is not None or form.constraints is not None:
+        raise InvalidRequest(
+            "variants_exclusive",
+            "The form holds variants beside edits or constraints.",
+            "Send `variants` alone; each of them may name all that the edits would.",
+        )
+    edits = parse_variants(form.variants or "")
+    return Order("edit", upload, form.infer_options(), form.edit_options(), edits)
 
 
 def _edit(asked: Asked[EditForm]) -> Response:

@@ -16,6 +16,7 @@ from starlette.formparsers import MultiPartParser
 
 from service.api.keeping import owner_of
 from service.api.names import parse_names
+from service.augment.options import LARGEST_SEED, MOST, AugmentOptions
 from service.errors import InvalidRequest, UnsupportedFormat
 from service.finding import blaming
 from service.requests import EditOptions, InferOptions, SliderOptions, TransferOptions, Upload
@@ -154,6 +155,15 @@ class EditForm(InferForm):
             json_schema_extra={"contentMediaType": "application/json"},
         ),
     ] = None
+    variants: Annotated[
+        Text,
+        Field(
+            description="In place of `edits` and `constraints`: a JSON array of up to 1000 objects "
+            "like `edits`. The answer is a zip with a file for each.",
+            examples=['[{"seat_width": {"scale": 1.1}}, {"seat_width": {"scale": 1.2}}]'],
+            json_schema_extra={"contentMediaType": "application/json"},
+        ),
+    ] = None
     mode: Mode = "blend"
     keep: Keep = None
     format: Format = None
@@ -163,7 +173,7 @@ class EditForm(InferForm):
     @classmethod
     def _something_to_do(cls, fields: Any) -> Any:
         """Without constraints a form lacks its edits; an unknown field may be a slip of either."""
-        if set(fields) <= set(cls.model_fields) - {"edits", "constraints"}:
+        if set(fields) <= set(cls.model_fields) - {"edits", "constraints", "variants"}:
             missing = InitErrorDetails(type="missing", loc=("edits",), input=fields)
             raise ValidationError.from_exception_data(cls.__name__, [missing])
         return fields
@@ -171,6 +181,30 @@ class EditForm(InferForm):
     def edit_options(self) -> EditOptions:
         """The options as the pipeline takes them."""
         return EditOptions(self.mode, self.keep, self.format, self.strict)
+
+
+class AugmentForm(InferForm):
+    """A mesh, how to read it, and how many variants of it to draw."""
+
+    count: Annotated[int, Field(ge=1, le=MOST, description="How many variants.")] = 10
+    seed: Annotated[
+        int, Field(ge=0, le=LARGEST_SEED, description="Another seed gives other variants.")
+    ] = 0
+    strength: Annotated[
+        float,
+        Field(ge=0, le=1, description="How far from the upload towards a draw from real shapes."),
+    ] = 1.0
+    mode: Mode = "blend"
+    keep: Keep = None
+    format: Format = None
+
+    def edit_options(self) -> EditOptions:
+        """The options as the pipeline takes them."""
+        return EditOptions(self.mode, self.keep, self.format)
+
+    def augment_options(self) -> AugmentOptions:
+        """How the variants are drawn."""
+        return AugmentOptions(self.count, self.seed, self.strength)
 
 
 class SlidersForm(InferForm):

@@ -14,4 +14,5 @@ class Head:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http" and scope["method"] == "HEAD":
             scope = {**scope, "method": "GET"}
+            scope.setdefault("state", {})["head"] = True
         await self.app(scope, receive, send)

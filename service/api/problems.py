@@ -16,6 +16,8 @@ from service.api.field_errors import explain
 from service.api.form_limits import overrun
 from service.api.left import ClientLeft, to_nobody
 from service.errors import (
+    Conflict,
+    Crowded,
     InvalidMesh,
     InvalidRequest,
     ModelFault,
@@ -36,12 +38,21 @@ STATUSES: dict[type[ShapeError], int] = {
     TooComplex: 422,
     InvalidRequest: 422,
     NotFound: 404,
+    Conflict: 409,
+    Crowded: 429,
     Overloaded: 503,
     ModelFault: 503,
 }
 
 # Seconds after which the same request may well pass.
-RETRY_AFTER = {"starting": "1", "deadline_exceeded": "10"}
+RETRY_AFTER = {
+    "starting": "1",
+    "deadline_exceeded": "10",
+    "job_not_finished": "1",
+    "jobs_full": "10",
+    "jobs_unavailable": "10",
+    "streams_full": "5",
+}
 
 # RFC 9110's phrases; older Pythons have others.
 _TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
@@ -60,9 +71,10 @@ _WHAT: dict[int, str] = {
     400: "The body is not well-formed multipart.",
     401: "The service wants an API key, and this is none that it knows.",
     403: "A browser says that a page of another origin sends this, and none is let in.",
-    404: "There is no such category, mesh or path.",
+    404: "There is no such category, mesh, job or path.",
     408: "The body came too slowly.",
-    413: "The upload is over a limit.",
+    409: "It does not go with what there is: `code` and `detail` say how.",
+    413: "The upload, or what is asked of it, is over a limit.",
     415: "The format can't be read, or can't be carried through without loss.",
     422: "The mesh is broken or too complex, or an option or edit makes no sense; `code` and "
     "`detail` say which.",
@@ -87,6 +99,27 @@ _HEADERS: dict[int, dict[str, Any]] = {
 }
 
 
+def document(
+    status: int,
+    code: str,
+    detail: str,
+    suggestion: str,
+    trace_id: str,
+    members: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """A problem as JSON; arguments as for `Problem`."""
+    return {
+        "type": "about:blank",
+        "title": _TITLES.get(status, HTTPStatus(status).phrase),
+        "status": status,
+        "detail": detail,
+        "code": code,
+        "suggestion": suggestion,
+        "trace_id": trace_id,
+        **(members or {}),
+    }
+
+
 class Problem(JSONResponse):
     """A problem document; `title` is the status's phrase, as goes with `about:blank`.
 
@@ -105,17 +138,8 @@ class Problem(JSONResponse):
         headers: dict[str, str] | None = None,
         members: Mapping[str, Any] | None = None,
     ) -> None:
-        document = {
-            "type": "about:blank",
-            "title": _TITLES.get(status, HTTPStatus(status).phrase),
-            "status": status,
-            "detail": detail,
-            "code": code,
-            "suggestion": suggestion,
-            "trace_id": trace_id,
-            **(members or {}),
-        }
-        super().__init__(document, status_code=status, headers=headers)
+        told = document(status, code, detail, suggestion, trace_id, members)
+        super().__init__(told, status_code=status, headers=headers)
         self.code = code
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -135,9 +159,14 @@ def internal_error(trace_id: str) -> Problem:
     )
 
 
+def status_of(error: type[ShapeError]) -> int:
+    """Of the answer that tells of it."""
+    return next(STATUSES[kind] for kind in error.__mro__ if kind in STATUSES)
+
+
 async def _shape_error(request: Request, error: Exception) -> Problem:
     assert isinstance(error, ShapeError)
-    status = next(STATUSES[kind] for kind in type(error).__mro__ if kind in STATUSES)
+    status = status_of(type(error))
     headers = {"Retry-After": RETRY_AFTER[error.code]} if error.code in RETRY_AFTER else None
     return Problem(
         status,

@@ -215,6 +215,49 @@ class TransferReport(EditReport):
     transfer: Transfer
 
 
+class Progress(Schema):
+    """How many of a job's variants are made."""
+
+    done: int
+    total: int
+
+
+class Links(Schema):
+    """Paths of what belongs to a job."""
+
+    self: str = Field(examples=["/jobs/job-x8Zb..."])
+    events: str
+    """Server-sent events, one for each change."""
+    result: str
+    """The zip, once it has succeeded."""
+
+
+class Job(Schema):
+    """Work that goes on after its request was answered."""
+
+    id: str = Field(examples=["job-x8Zb..."])
+    kind: Literal["edit", "augment"]
+    status: Literal["queued", "running", "succeeded", "failed", "cancelled"]
+    progress: Progress
+    created: str = Field(json_schema_extra={"format": "date-time"})
+    started: str | None = Field(json_schema_extra={"format": "date-time"})
+    finished: str | None = Field(json_schema_extra={"format": "date-time"})
+    expires: str = Field(json_schema_extra={"format": "date-time"})
+    """When it is deleted with all that belongs to it, unless it goes on before."""
+    durable: bool
+    """Whether it outlives a restart of the service."""
+    problem: ProblemDocument | None
+    """Of a job that failed: what the same request would have been answered with at once."""
+    links: Links
+
+
+class Jobs(Schema):
+    """What `GET /jobs` answers."""
+
+    jobs: list[Job]
+    """The caller's own, newest first."""
+
+
 class Parameter(Schema):
     """A parameter or derived dimension of a category."""
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import sys
-import threading
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, nullcontext
@@ -21,6 +18,7 @@ from service import deadline, stages
 from service.api.left import ClientLeft
 from service.errors import Overloaded
 from service.mesh import limits
+from service.priority import stand_back
 
 T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
@@ -31,8 +29,6 @@ WEIGHT = 0.1
 NICENESS = 10
 """By how much a working thread stands back behind the event loop's, which answers probes in half
 the time so."""
-
-_this_thread = threading.local()
 
 
 class Workers:
@@ -142,7 +138,7 @@ class Workers:
         self, work: Callable[[], T], abandoned: Event, record: stages.Record | None
     ) -> T:
         def limited() -> T:
-            _stand_back()
+            stand_back(NICENESS)
             noted = nullcontext() if record is None else stages.recording(record)
             with (
                 deadline.limit(self._seconds, abandoned),
@@ -155,15 +151,6 @@ class Workers:
 
     def _keep_pace(self, seconds: float) -> None:
         self.pace += (WEIGHT if self.pace else 1.0) * (seconds - self.pace)
-
-
-def _stand_back() -> None:
-    """Lower this thread's priority, once; where a thread has none of its own, nothing happens."""
-    if sys.platform == "linux" and not getattr(_this_thread, "stands_back", False):
-        thread = threading.get_native_id()
-        niceness = os.getpriority(os.PRIO_PROCESS, thread) + NICENESS
-        os.setpriority(os.PRIO_PROCESS, thread, min(niceness, 19))
-        _this_thread.stands_back = True
 
 
 async def _listen(receive: Receive, abandoned: Event, scope: CancelScope) -> None:

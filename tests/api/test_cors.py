@@ -76,7 +76,7 @@ def test_a_preflight_tells_what_may_be_sent(make: Callable[..., httpx.Client]) -
     response = preflight(make(cors_origins=PAGE), headers=sent)
     assert response.status_code == 200
     assert response.headers["access-control-allow-origin"] == PAGE
-    assert response.headers["access-control-allow-methods"] == "GET, HEAD, POST"
+    assert response.headers["access-control-allow-methods"] == "DELETE, GET, HEAD, POST"
     assert int(response.headers["access-control-max-age"]) >= 600
     assert response.headers["trace-id"]
     assert response.headers["x-content-type-options"] == "nosniff"

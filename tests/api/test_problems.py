@@ -17,6 +17,8 @@ CASES = [
     (errors.TooComplex, 422, "Unprocessable Content"),
     (errors.InvalidRequest, 422, "Unprocessable Content"),
     (errors.NotFound, 404, "Not Found"),
+    (errors.Conflict, 409, "Conflict"),
+    (errors.Crowded, 429, "Too Many Requests"),
     (errors.Overloaded, 503, "Service Unavailable"),
     (errors.ModelFault, 503, "Service Unavailable"),
 ]
