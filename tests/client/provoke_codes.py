@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import product
 
-from provoke_source import Place, Source, argument, arguments_of, bindings, name_of
+from provoke_source import Known, Place, Source, argument, arguments_of, bindings
 
 from service.mesh.formats import READERS, ZIP
 
@@ -27,19 +27,24 @@ class Codes:
         self.source = source
 
     @cached_property
-    def takes_a_code(self) -> dict[str, int]:
-        """Names of classes, and which of their arguments is the code."""
-        classes = [kind for _, kind in self.source.classes]
-        found, before = {"ShapeError": 0}, 0
+    def takes_a_code(self) -> dict[Known, int]:
+        """Classes, and which of their arguments is the code."""
+        source, found = self.source, {}
+        for module, kind in source.classes:
+            named = [argument for node in kind.body for argument in _of_init(node)] or _fields(kind)
+            if "code" in named:
+                found[module, kind.name] = named.index("code")
+        before = 0
         while len(found) > before:
             before = len(found)
-            found |= {c.name: 0 for c in classes if found.keys() & set(map(name_of, c.bases))}
-        for kind in classes:
-            plain = "__init__" not in [getattr(node, "name", "") for node in kind.body]
-            assert plain or kind.name not in found or kind.name == "ShapeError", kind.name
-        fields = {kind.name: _fields(kind) for kind in classes}
-        told = {name: own.index("code") for name, own in fields.items() if "code" in own}
-        return found | {"Problem": 1} | told
+            for module, kind in source.classes:
+                bases = [source.origin(module, base) for base in kind.bases]
+                inherited = [found[base] for base in bases if base in found]
+                if inherited and (module, kind.name) not in found:
+                    own = "__init__" in [getattr(node, "name", "") for node in kind.body]
+                    assert not own, f"{module}: what is the code of {kind.name}?"
+                    found[module, kind.name] = inherited[0]
+        return found
 
     def found(self) -> dict[str, set[str]]:
         """By code the modules that answer with it.
@@ -48,12 +53,21 @@ class Codes:
             LookupError: what a code can be can't be followed.
         """
         found: dict[str, set[str]] = {}
+        names = {name for _, name in self.takes_a_code}
         for module, name, place in self.source.calls:
-            if name not in self.takes_a_code:
+            known = self.source.origin(module, place.node.func)
+            if known is None and name in names:
+                raise LookupError(f"{module}:{place.node.lineno}: which {name} is it?")
+            index = self.takes_a_code.get(known)
+            if index is None:
                 continue
-            code = argument(place.node, self.takes_a_code[name], "code")
+            code = argument(place.node, index, "code")
             assert code is not None, f"{module}:{place.node.lineno} has no code"
-            for text in self.texts(place.at(code)):
+            try:
+                texts = list(self.texts(place.at(code)))
+            except LookupError as error:
+                raise LookupError(f"{module}:{place.node.lineno}: {error}") from error
+            for text in texts:
                 found.setdefault(text, set()).add(module)
         return found
 
@@ -124,7 +138,9 @@ class Codes:
 
     def _member(self, name: str, place: Place) -> Iterator[Place]:
         """What classes have under a name."""
-        return self._bound(name, place, self.source.classes)
+        return self._bound(
+            name, place, [(self.source.modules[m], c) for m, c in self.source.classes]
+        )
 
     def _constants(self, name: str, place: Place) -> Iterator[Place]:
         return self._bound(name, place, [(tree, tree) for tree in self.source.modules.values()])
@@ -193,6 +209,12 @@ class Codes:
             for node in ast.walk(function):
                 if isinstance(node, ast.Return) and node.value is not None:
                     yield from self.ends(Place(node.value, (function, tree)))
+
+
+def _of_init(node: ast.stmt) -> list[str]:
+    """Arguments that a class is made with, by its own word."""
+    own = isinstance(node, ast.FunctionDef) and node.name == "__init__"
+    return arguments_of(node)[1:] if own else []
 
 
 def _fields(kind: ast.ClassDef) -> list[str]:

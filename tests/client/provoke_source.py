@@ -13,6 +13,10 @@ STARTS = ("service/main.py", "service/__main__.py")
 """What is not imported from here, sooner or later, answers no request."""
 
 
+Known = tuple[str, str]
+"""A module's file and a name in it."""
+
+
 @dataclass(frozen=True)
 class Place:
     """An expression, and the functions and the module around it, the innermost first."""
@@ -38,10 +42,44 @@ class Source:
                 pending += _imported(self.modules[name])
 
     @cached_property
-    def classes(self) -> list[tuple[ast.Module, ast.ClassDef]]:
-        """Every class and its module."""
-        nodes = [(tree, node) for tree in self.modules.values() for node in ast.walk(tree)]
-        return [(tree, node) for tree, node in nodes if isinstance(node, ast.ClassDef)]
+    def classes(self) -> list[tuple[str, ast.ClassDef]]:
+        """Every class of a module."""
+        nodes = [(module, node) for module, tree in self.modules.items() for node in tree.body]
+        return [(module, node) for module, node in nodes if isinstance(node, ast.ClassDef)]
+
+    def origin(self, module: str, called: ast.expr) -> Known | None:
+        """The class that is meant by a name, or a name of an imported module's, in a module."""
+        match called:
+            case ast.Name(id=name):
+                return self._origin(module, name)
+            case ast.Attribute(value=ast.Name(id=base), attr=name):
+                whose = self._imports.get((module, base))
+                return self._origin(f"{whose.replace('.', '/')}.py", name) if whose else None
+        return None
+
+    def _origin(self, module: str, name: str) -> Known | None:
+        while (module, name) not in self._defined:
+            path = self._imports.get((module, name))
+            if path is None:
+                return None
+            package, _, name = path.rpartition(".")
+            module = f"{package.replace('.', '/')}.py"
+        return module, name
+
+    @cached_property
+    def _defined(self) -> frozenset[Known]:
+        return frozenset((module, kind.name) for module, kind in self.classes)
+
+    @cached_property
+    def _imports(self) -> dict[Known, str]:
+        """What a name of a module is by its imports: dotted, its own name last."""
+        return {
+            (module, alias.asname or alias.name): f"{node.module}.{alias.name}"
+            for module, tree in self.modules.items()
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
 
     @cached_property
     def calls(self) -> list[tuple[str, str, Place]]:

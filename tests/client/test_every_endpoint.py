@@ -12,24 +12,48 @@ from fastapi.routing import iter_route_contexts
 from provoke import BOX
 
 from service.api.routes import Routes
-from service.client import ShapeClient
+from service.client import Job, ShapeClient
 from service.main import create_app
 from service.settings import Settings
 
 Operation = tuple[str, str]
 
 
+WIDER = [{"width": {"scale": 1.2}}]
+
+
 def by_id(client: ShapeClient) -> Any:
     return client.mesh(client.infer(BOX).mesh_id)
+
+
+def submitted(client: ShapeClient) -> Job:
+    return client.submit_edit(BOX, WIDER)
+
+
+def followed(client: ShapeClient) -> Any:
+    """All that is told of a job, up to its end."""
+    told = list(client.events(submitted(client)))
+    assert told[-1].job.status == "succeeded"
+    return told
+
+
+def fetched(client: ShapeClient) -> Any:
+    return client.result(client.wait(submitted(client), timeout=20)).manifest
 
 
 CALLS: dict[Operation, Callable[[ShapeClient], Any]] = {
     ("GET", "/categories"): lambda client: client.categories(),
     ("GET", "/categories/{name}"): lambda client: client.category("debug"),
+    ("DELETE", "/jobs/{job_id}"): lambda client: client.cancel(submitted(client)) or True,
+    ("GET", "/jobs"): lambda client: [submitted(client), *client.jobs()],
+    ("GET", "/jobs/{job_id}"): lambda client: client.job(submitted(client)),
+    ("GET", "/jobs/{job_id}/events"): followed,
+    ("GET", "/jobs/{job_id}/result"): fetched,
     ("GET", "/livez"): lambda client: client.alive(),
     ("GET", "/meshes/{mesh_id}"): by_id,
     ("GET", "/metrics"): lambda client: client.post("/metrics", method="GET"),
     ("GET", "/readyz"): lambda client: client.ready(),
+    ("POST", "/augment"): lambda client: client.augment(BOX, count=2).manifest,
     ("POST", "/edit"): lambda client: client.edit(BOX, {"width": {"scale": 1.2}}),
     ("POST", "/infer"): lambda client: client.infer(BOX),
     ("POST", "/sliders"): lambda client: client.sliders(BOX),

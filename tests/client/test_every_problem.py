@@ -17,6 +17,7 @@ from provoke_codes import Codes
 from provoke_source import Source
 
 from service.client import ShapeClient
+from service.client.errors import ProblemError
 from service.main import create_app
 from service.settings import Settings
 
@@ -26,6 +27,9 @@ ROW = re.compile(r"^\| `(\w+)` \| (?:([\d, ]+) \| )?.+ \|$", re.MULTILINE)
 HEADING = "## In Python alone"
 
 OPTIONS = {
+    "count_out_of_range": "count",
+    "seed_out_of_range": "seed",
+    "strength_out_of_range": "strength",
     "unknown_format": "format",
     "unknown_front": "front",
     "unknown_mode": "mode",
@@ -36,6 +40,13 @@ OPTIONS = {
     "unknown_up": "up",
 }
 """Told by the pipeline of an option whose values the form knows and has checked before."""
+
+PATHS = {
+    "joint_names": "/sliders",
+    **dict.fromkeys(("size", "position"), "/transfer"),
+    **dict.fromkeys(("count", "seed", "strength"), "/augment"),
+}
+"""Where an option is one of another call than `/edit`."""
 
 UNREACHED = {
     **{code: f"a form says field_invalid of {field}" for code, field in OPTIONS.items()},
@@ -80,6 +91,10 @@ def test_every_code_is_explained(codes: frozenset[str], provoked: dict[str, set[
     assert sorted(code for code, _ in ROW.findall(others)) == sorted(UNREACHED)
 
 
+def test_the_client_knows_of_no_other_code(codes: frozenset[str]) -> None:
+    assert not ProblemError.by_code.keys() - codes
+
+
 @pytest.fixture(scope="module")
 def boxes(serving: Any) -> Any:
     with serving(create_app(Settings(categories=("debug",), workers=1))) as http:
@@ -88,10 +103,9 @@ def boxes(serving: Any) -> Any:
 
 @pytest.mark.parametrize("field", sorted(OPTIONS.values()))
 def test_options_are_checked_by_the_form(boxes: ShapeClient, field: str) -> None:
-    path = {"joint_names": "/sliders", "size": "/transfer", "position": "/transfer"}.get(field)
-    parts = ("source", "target") if path == "/transfer" else ("mesh",)
-    files = dict.fromkeys(parts, BOX)
-    fields = {field: "sideways"} | ({} if path else {"edits": "{}"})
-    refusal = refused(lambda: boxes.post(path or "/edit", files=files, fields=fields))
+    path = PATHS.get(field, "/edit")
+    files = dict.fromkeys(("source", "target") if path == "/transfer" else ("mesh",), BOX)
+    fields = {field: "-1"} | ({"edits": "{}"} if path == "/edit" else {})
+    refusal = refused(lambda: boxes.post(path, files=files, fields=fields))
     assert refusal.code == "field_invalid"
     assert field in refusal.detail

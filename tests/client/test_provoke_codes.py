@@ -13,6 +13,14 @@ class ShapeError(Exception):
     def __init__(self, code, detail): ...
 class NotFound(ShapeError): ...
 class Gone(NotFound): ...
+class Problem:
+    def __init__(self, status, code, detail): ...
+"""
+
+
+IMPORTS = """
+from service import errors
+from service.errors import Gone, NotFound, Problem
 """
 
 
@@ -21,7 +29,7 @@ def codes(folder: Path, text: str) -> set[str]:
     service = folder / "service"
     service.mkdir()
     (service / "errors.py").write_text(ERRORS, "utf-8")
-    (service / "nouns.py").write_text(f"from service.errors import Gone\n{text}", "utf-8")
+    (service / "nouns.py").write_text(IMPORTS + text, "utf-8")
     (service / "else.py").write_text('raise NotFound("elsewhere", "b")', "utf-8")
     return set(Codes(Source(folder, ["service/nouns.py"])).found())
 
