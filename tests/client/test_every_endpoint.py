@@ -1,4 +1,4 @@
-"""Every operation of the service's document is called through the client, and succeeds."""
+"""Every operation of the service's document is called through both clients, and succeeds."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 from provoke import BOX
+from provoke_blocking import blocking
 
 from service.api.routes import Routes
 from service.client import Job, ShapeClient
@@ -17,7 +18,6 @@ from service.main import create_app
 from service.settings import Settings
 
 Operation = tuple[str, str]
-
 
 WIDER = [{"width": {"scale": 1.2}}]
 
@@ -89,10 +89,18 @@ def answered() -> list[httpx.Response]:
     return []
 
 
-@pytest.fixture
-def client(http: httpx.Client, answered: list[httpx.Response]) -> Iterator[ShapeClient]:
+@pytest.fixture(params=["blocking", "asynchronous"])
+def client(
+    http: httpx.Client, answered: list[httpx.Response], request: pytest.FixtureRequest
+) -> Iterator[Any]:
+    """Either client."""
+    url = str(http.base_url)
+    if request.param == "asynchronous":
+        with blocking(url, answered.append) as waiting:
+            yield waiting
+        return
     with httpx.Client(event_hooks={"response": [answered.append]}, trust_env=False) as noting:
-        yield ShapeClient(str(http.base_url), http=noting)
+        yield ShapeClient(url, http=noting)
 
 
 def operations(app: FastAPI) -> set[Operation]:
