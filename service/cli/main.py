@@ -13,6 +13,7 @@ from service.cli.commands.categories import categories
 from service.cli.commands.completion import completion
 from service.cli.commands.edit import edit
 from service.cli.commands.infer import infer
+from service.cli.commands.jobs import jobs
 from service.cli.commands.serve import serve
 from service.cli.commands.sliders import sliders, template
 from service.cli.commands.transfer import transfer
@@ -60,7 +61,18 @@ def cli() -> None:
     """
 
 
-for command in (infer, edit, sliders, template, transfer, augment, categories, serve, completion):
+for command in (
+    infer,
+    edit,
+    sliders,
+    template,
+    transfer,
+    augment,
+    jobs,
+    categories,
+    serve,
+    completion,
+):
     cli.add_command(command)
 
 

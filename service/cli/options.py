@@ -39,7 +39,9 @@ class Where:
             return Local()
         from service.cli.remote import Remote
 
-        return Remote(self.url, self.api_key)
+        remote = Remote(self.url, self.api_key)
+        click.get_current_context().call_on_close(remote.client.close)
+        return remote
 
 
 def _all(*decorators: Decorator) -> Decorator:

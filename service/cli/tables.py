@@ -139,6 +139,16 @@ def category(entry: Report) -> list[RenderableType]:
     return [head, table]
 
 
+def jobs(entries: Iterable[Report]) -> Table:
+    """Jobs, a line each."""
+    table = _table("job", "kind", "status", "made", "created", "expires")
+    for job in entries:
+        made = f"{job['progress']['done']} of {job['progress']['total']}"
+        times = job["created"], job["expires"]
+        table.add_row(job["id"], job["kind"], job["status"], made, *times)
+    return table
+
+
 def warnings(texts: Iterable[str]) -> list[Text]:
     """Warnings, a paragraph each."""
     return [Text(f"Warning: {text}", style="yellow") for text in texts]
