@@ -66,5 +66,17 @@ def _allowed(name: str, error: Mapping[str, Any]) -> str:
             return f"{name} is one of {error['ctx']['expected'].replace(' or ', ', ')}."
         case "bool_parsing" | "bool_type":
             return f"{name} is one of true, false, 1, 0."
+        case "int_parsing" | "int_parsing_size" | "int_from_float":
+            return f"{name} is a whole number."
+        case "float_parsing":
+            return f"{name} is a number."
+        case "greater_than_equal":
+            return f"{name} is at least {error['ctx']['ge']}."
+        case "less_than_equal":
+            return f"{name} is at most {error['ctx']['le']}."
+        case "string_too_short":
+            return f"{name} is not empty."
+        case "string_too_long":
+            return f"{name} has at most {error['ctx']['max_length']} characters."
         case _:
             return f"{name}: {error['msg']}."

@@ -44,6 +44,42 @@ def test_a_wrong_option_is_told_with_what_is_allowed(
     assert allowed in document.suggestion
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "allowed"),
+    [
+        ("count", "0", "count is at least 1."),
+        ("count", "1001", "count is at most 1000."),
+        ("count", "2.5", "count is a whole number."),
+        ("count", "ten", "count is a whole number."),
+        ("count", "9" * 5000, "count is a whole number."),
+        ("seed", "-1", "seed is at least 0."),
+        ("seed", str(2**63), f"seed is at most {2**63 - 1}."),
+        ("strength", "1.5", "strength is at most 1.0."),
+        ("strength", "some", "strength is a number."),
+        ("strength", "nan", "strength is at most 1.0."),
+    ],
+)
+def test_a_wrong_number_is_told_with_its_bounds(
+    client: httpx.Client, problem: Any, field: str, value: str, allowed: str
+) -> None:
+    response = client.post("/augment", files=MESH, data={field: value})
+    document = problem(response, 422, "field_invalid")
+    assert document.detail == f"{field}: '{value[:80]}' is not allowed."
+    assert document.suggestion == allowed
+
+
+@pytest.mark.parametrize(
+    ("key", "allowed"), [("", "is not empty."), ("x" * 256, "has at most 255 characters.")]
+)
+def test_a_wrong_header_is_told_likewise(
+    client: httpx.Client, problem: Any, key: str, allowed: str
+) -> None:
+    headers = {"Prefer": "respond-async", "Idempotency-Key": key}
+    response = client.post("/augment", files=MESH, headers=headers)
+    document = problem(response, 422, "field_invalid")
+    assert document.suggestion == f"idempotency-key {allowed}"
+
+
 def test_several_wrong_options_are_told_together(client: httpx.Client, problem: Any) -> None:
     response = client.post("/infer", files=MESH, data={"up": "no", "units": "parsec"})
     detail = problem(response, 422, "field_invalid").detail
