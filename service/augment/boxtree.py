@@ -32,8 +32,8 @@ class BoxTree:
         self._corners = np.ascontiguousarray(faces[self._order].T)
 
     def near(self, vertices: Array, reach: float = 0.0) -> Index:
-        """``[m, 2]`` faces whose boxes are no farther apart than `reach` along any axis, in the mesh
-        as it is now; the lesser index first, each pair once."""
+        """``[m, 2]`` faces whose boxes are no farther apart than `reach` along any axis, with the
+        vertices where they are now; the lesser index first, each pair once."""
         levels = self._levels(vertices, reach)
         low, _ = levels[-1]
         count = low.shape[1]

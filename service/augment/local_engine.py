@@ -22,12 +22,21 @@ from service.errors import ModelFault
 
 GRACE_S = 30.0
 """Beyond the deadline, after which a worker that does not look at it is ended."""
+READY = "ready"
 TURNOVER = 500
 """Sources after which a worker gives way to a new one, lest it grow."""
 
 
-def run_local(plan: Plan, tasks: Sequence[Task], workers: int) -> Iterator[Outcome]:
+def run_local(
+    plan: Plan, tasks: Sequence[Task], workers: int, work: type[Work] = Work
+) -> Iterator[Outcome]:
     """Outcomes of the tasks, as they come.
+
+    Args:
+        plan: the batch.
+        tasks: what to do.
+        workers: how many processes.
+        work: what each of them does.
 
     Raises:
         Exception: what a worker could not go on after, such as a full disk.
@@ -36,7 +45,7 @@ def run_local(plan: Plan, tasks: Sequence[Task], workers: int) -> Iterator[Outco
     recorder: Work | None = None
     try:
         for _ in range(min(workers, len(todo))):
-            crew.append(_Worker(plan))
+            crew.append(_Worker(plan, work))
         while todo or any(worker.task for worker in crew):
             for worker in crew:
                 if worker.task is None and todo:
@@ -51,11 +60,11 @@ def run_local(plan: Plan, tasks: Sequence[Task], workers: int) -> Iterator[Outco
                 if answer is not None:
                     yield answer
                 else:
-                    recorder = recorder or Work(plan)
+                    recorder = recorder or work(plan)
                     yield recorder.failed(task, *worker.fault())
                 if answer is None or worker.served >= TURNOVER:
                     worker.end()
-                    crew[place] = _Worker(plan)
+                    crew[place] = _Worker(plan, work)
             busy = [worker.pipe for worker in crew if worker.task]
             if busy and not any(pipe.poll() for pipe in busy):
                 wait(busy, timeout=0.5)
@@ -67,14 +76,15 @@ def run_local(plan: Plan, tasks: Sequence[Task], workers: int) -> Iterator[Outco
 class _Worker:
     """A process, and the source that it is at."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, work: type[Work]) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.task: Task | None = None
         self.served = 0
+        self._closed = False
         self._plan, self._ready, self._since = plan, False, time.monotonic()
         self._process: SpawnProcess = context.Process(
-            target=_serve, args=(plan, theirs), daemon=True
+            target=_serve, args=(plan, work, theirs), daemon=True
         )
         self._process.start()
         theirs.close()
@@ -88,19 +98,23 @@ class _Worker:
 
     def answer(self) -> Outcome | None:
         """What became of the source, if it is known."""
-        try:
-            while self.pipe.poll():
-                message = self.pipe.recv()
-                if isinstance(message, BaseException):
-                    raise message
-                if message is None:
-                    self._ready, self._since = True, time.monotonic()
-                    continue
+        while (message := self._message()) is not None:
+            if isinstance(message, BaseException):
+                raise message
+            if isinstance(message, Outcome):
                 self.served += 1
                 return message
-        except (EOFError, OSError):
-            self._process.join(5.0)
+            self._ready, self._since = True, time.monotonic()
         return None
+
+    def _message(self) -> Any:
+        """What it has said next, if anything."""
+        try:
+            return self.pipe.recv() if self.pipe.poll() else None
+        except (EOFError, OSError):
+            self._closed = True
+            self._process.join(5.0)
+            return None
 
     @property
     def lost(self) -> bool:
@@ -109,20 +123,13 @@ class _Worker:
         Raises:
             ModelFault: when it could not even begin.
         """
-        dead = not self._process.is_alive() and not self._waiting()
-        if dead and not self._ready:
+        if self._closed and not self._ready:
             raise ModelFault(
                 "worker_died",
                 f"a worker ended before it began, with status {self._process.exitcode}",
                 "Free some memory, or ask for fewer workers.",
             )
-        return dead or self._late
-
-    def _waiting(self) -> bool:
-        try:
-            return self.pipe.poll()
-        except (EOFError, OSError):
-            return False
+        return self._closed or self._late
 
     @property
     def _late(self) -> bool:
@@ -131,7 +138,7 @@ class _Worker:
 
     def fault(self) -> tuple[str, str]:
         """Code and detail of why there is no answer."""
-        if self._process.is_alive():
+        if not self._closed:
             return "worker_hung", f"no end in sight after {self._plan.deadline_s:g} s"
         return "worker_died", f"the worker ended with status {self._process.exitcode}"
 
@@ -146,13 +153,13 @@ class _Worker:
         self.pipe.close()
 
 
-def _serve(plan: Plan, pipe: Connection[Any, Any]) -> None:
+def _serve(plan: Plan, kind: type[Work], pipe: Connection[Any, Any]) -> None:
     """A worker's life: sources in, outcomes out, until the pipe is closed."""
     # Ctrl-C reaches all processes of a terminal; the one that asked ends the others.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        work = Work(plan)
-        pipe.send(None)
+        work = kind(plan)
+        pipe.send(READY)
         while True:
             pipe.send(work(pipe.recv()))
     except EOFError:

@@ -76,9 +76,7 @@ class Damage:
         if self.degenerate > limits.degenerate * self.faces:
             found.append(f"{self.degenerate} of {self.faces} faces collapse")
         if self.crossings > limits.crossings:
-            found.append(
-                f"{self.crossings:.1f} more pairs of faces per {PER} run through each other"
-            )
+            found.append(f"{self.crossings:.1f} more pairs of faces per {PER} cross each other")
         if self.gaps > limits.gaps:
             found.append(f"{self.gaps} pairs of pieces that touched come apart")
         return found
