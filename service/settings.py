@@ -81,7 +81,7 @@ class Settings(BaseSettings):
 
     store_dir: Path | None = None
     """Folder for the same meshes, which are then found again after a restart; it is made if there
-    is none. Without it, nothing is ever written to a disk."""
+    is none. Without it and JOBS_DIR, nothing is ever written to a disk."""
 
     store_bytes: PositiveInt = 1024 * MEBIBYTE
     """Disk for them there, in bytes; the least recently used go."""

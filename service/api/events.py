@@ -9,6 +9,7 @@ from typing import Annotated
 
 from anyio import sleep, to_thread
 from fastapi import APIRouter, Header, Request
+from pydantic.json_schema import SkipJsonSchema
 from starlette.responses import Response, StreamingResponse
 
 from service.api.context import Context, Shared
@@ -57,7 +58,8 @@ async def follow_job(
     job_id: JobId,
     shared: Shared,
     last_event_id: Annotated[
-        str | None, Header(description="The `id` of the last event that came.", examples=["3"])
+        str | SkipJsonSchema[None],
+        Header(description="The `id` of the last event that came.", examples=["3"]),
     ] = None,
 ) -> Response:
     job = await to_thread.run_sync(shared.jobs.store.get, job_id, owner_of(request))

@@ -13,6 +13,8 @@ from service.api.context import Context
 from service.api.metrics import PREFIX
 from service.encode.installed import Installed
 from service.errors import ShapeError
+from service.jobs.job import STATUSES
+from service.jobs.order import KINDS
 
 Rows = Iterable[tuple[Sequence[str], float]]
 
@@ -33,6 +35,7 @@ class Mirror(Collector):
         yield from self._models()
         yield from self._store()
         yield from self._inferences()
+        yield from self._jobs()
 
     def _work(self) -> Iterator[Metric]:
         workers, admission = self._context.workers, self._context.admission
@@ -123,6 +126,31 @@ class Mirror(Collector):
         yield _counter("inference_cache_hits", hits, (), [((), known.hits)])
         misses = "Requests whose mesh had to be looked at."
         yield _counter("inference_cache_misses", misses, (), [((), known.misses)])
+
+    def _jobs(self) -> Iterator[Metric]:
+        jobs = self._context.jobs
+        counts, taken = jobs.store.counts()
+        rows = [((status,), counts[status]) for status in STATUSES]
+        yield _gauge("jobs", "Jobs that are kept, by status.", ("status",), rows)
+        yield _one("jobs_bytes", "What jobs and results take, or may come to.", taken)
+        yield _one("jobs_limit_bytes", "What they may take.", jobs.store.bounds.bytes)
+        yield _one("job_streams", "Clients that are told of jobs by events.", jobs.streams)
+        made, ended = jobs.runner.made, jobs.runner.ended
+        yield _counter(
+            "job_variants",
+            "Variants that jobs came to, by whether they could be made.",
+            ("kind", "result"),
+            [((k, r), made[k, r]) for k in KINDS for r in ("ok", "failed")],
+        )
+        yield _counter(
+            "jobs_ended",
+            "Jobs that were carried out, by how that went.",
+            ("kind", "status"),
+            [((k, s), ended[k, s]) for k in KINDS for s in ("succeeded", "failed")],
+        )
+        yield _counter(
+            "job_faults", "Times that the database failed.", (), [((), jobs.store.faults)]
+        )
 
 
 def _one(name: str, help: str, value: float) -> Metric:

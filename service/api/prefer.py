@@ -5,19 +5,20 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import Header
+from pydantic.json_schema import SkipJsonSchema
 from starlette.requests import Request
 
 RESPOND_ASYNC = "respond-async"
 
 Prefer = Annotated[
-    str | None,
+    str | SkipJsonSchema[None],
     Header(
         description="`respond-async`: be answered at once, with 202 and a job to come back to.",
         examples=[RESPOND_ASYNC],
     ),
 ]
 IdempotencyKey = Annotated[
-    str | None,
+    str | SkipJsonSchema[None],
     Header(
         description="With `Prefer: respond-async`: the same key gives the same job again, however "
         "often the request is sent.",

@@ -15,6 +15,7 @@ from starlette.types import Receive, Scope, Send
 from service.api.field_errors import explain
 from service.api.form_limits import overrun
 from service.api.left import ClientLeft, to_nobody
+from service.api.routes import methods_of
 from service.errors import (
     Conflict,
     Crowded,
@@ -196,8 +197,7 @@ def from_http(scope: Scope, error: HTTPException) -> Problem:
         detail = f"There is nothing at {scope['path'][:200]!r}."
     elif status == 405:
         detail = f"{scope['method']} is not a method of {scope['path'][:200]!r}."
-        if headers.get("Allow") == "GET":
-            headers["Allow"] = "GET, HEAD"
+        headers["Allow"] = ", ".join(sorted(methods_of(scope["app"].routes, scope["path"])))
     return Problem(status, code, detail, suggestion, scope["state"]["trace_id"], headers)
 
 

@@ -16,6 +16,14 @@ PROBES = frozenset({"/livez", "/metrics", "/readyz"})
 """Routes that machines ask every few seconds: of no interest but to who debugs them."""
 
 
+def methods_of(routes: Sequence[BaseRoute], path: str) -> set[str]:
+    """All that a path may be asked for, over all routes that it is of."""
+    found = (context.original_route for context in iter_route_contexts(routes))
+    own = [route for route in found if isinstance(route, Route) and route.path_regex.match(path)]
+    methods = {method for route in own for method in route.methods or ()}
+    return methods | ({"HEAD"} if "GET" in methods else set())
+
+
 class Routes:
     """The templates of an app's paths; they are few, whatever clients ask for."""
 

@@ -15,6 +15,7 @@ from service.encode.versions import choose
 from service.requests import EditOptions, InferOptions, Upload
 
 Kind = Literal["edit", "augment"]
+KINDS: tuple[Kind, ...] = ("edit", "augment")
 
 
 @dataclass(frozen=True)

@@ -216,7 +216,10 @@ def test_the_settings_of_a_pod_are_the_services(manifest: Manifest) -> None:
     assert known.api_keys_file.name in kubernetes("secret.example")["stringData"]
     assert known.store_dir is not None
     store = volumes[mounts[known.store_dir]]["emptyDir"]
-    assert quantity(store["sizeLimit"]) > known.store_bytes
+    assert known.jobs_dir is not None
+    assert known.jobs_dir.is_relative_to(known.store_dir)
+    assert known.jobs_bytes is not None
+    assert quantity(store["sizeLimit"]) > known.store_bytes + known.jobs_bytes
     assert "emptyDir" in volumes[mounts[Path("/tmp")]]
     assert known.max_upload_bytes <= known.max_pending_bytes
     memory = pod(manifest)["containers"][0]["resources"]["limits"]["memory"]
@@ -264,6 +267,9 @@ def test_composes_settings_are_the_services() -> None:
     known = settings(given)
     (store,) = COMPOSE["volumes"]
     assert store == f"store:{known.store_dir}"
+    assert known.jobs_dir is not None
+    assert known.store_dir is not None
+    assert known.jobs_dir.is_relative_to(known.store_dir)
     assert "store" in read(DOCKER / "compose.yaml")["volumes"]
     assert known.max_upload_bytes <= known.max_pending_bytes <= 2 * 2**30 / 8
     grace = COMPOSE["stop_grace_period"]
