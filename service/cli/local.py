@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cached_property, partial
@@ -43,6 +43,7 @@ class Local:
     def __init__(self) -> None:
         # Matrices are small: threads inside BLAS only contend.
         threadpool_limits(1, user_api="blas")
+        self.tell: Callable[[str], None] = lambda _: None
 
     def infer(self, mesh: Mesh, reading: Options) -> dict[str, Any]:
         with told():

@@ -18,6 +18,8 @@ from service.cli.problem import CLOSED, Problem
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
+    from service.cli.shapes import Shapes
+
 
 @dataclass
 class Output:
@@ -57,20 +59,14 @@ class Output:
         return not (self.as_json or self.quiet)
 
     @contextmanager
-    def busy(self, what: str) -> Iterator[Callable[[str], None]]:
-        """Show on a terminal that something is being worked on, until the block ends.
-
-        Args:
-            what: a file, say.
-
-        Yields:
-            a function to show how far it is.
-        """
+    def busy(self, file: str, shapes: Shapes) -> Iterator[None]:
+        """Show on a terminal that a file is being worked on, and how far, until the block ends."""
         if self.quiet or not sys.stderr.isatty():
-            yield lambda _: None
+            yield
             return
-        with self.errors.status(what) as status:
-            yield lambda far: status.update(f"{what}  {far}")
+        with self.errors.status(file) as status:
+            shapes.tell = lambda far: status.update(f"{file}  {far}")
+            yield
 
     @contextmanager
     def counting(self, what: str) -> Iterator[Callable[[int, int, int], None]]:

@@ -38,7 +38,12 @@ class Shapes(Protocol):
     Every method raises `Problem` for what can't be served.  Reports and descriptions are the JSON
     of the HTTP contract.  `reading` is how a mesh is to be read: category, up, front, units,
     refine.
+
+    Attributes:
+        tell: is told how far an upload or a download is, if there is any.
     """
+
+    tell: Callable[[str], None]
 
     def infer(self, mesh: Mesh, reading: Options) -> dict[str, Any]:
         """The report on a mesh."""

@@ -13,13 +13,14 @@ from typing import Any
 import click
 import pytest
 import trimesh
-from cli_runs import Run
+from cli_runs import Run, box
 from pretend_body import saved
 
 import service.__main__
 from service.augment import driver
 from service.cli.local import Local
 from service.cli.main import cli
+from service.client import ShapeClient
 from service.encode.installed import Installed
 from service.template.skinned import Body, SkinnedTemplate
 
@@ -90,11 +91,17 @@ def folder(
 
 @pytest.mark.parametrize("line", ALL)
 def test_examples_work_as_they_stand(
-    line: str, shape_edit: Run, folder: Path, meshes: dict[str, bytes]
+    line: str, shape_edit: Run, folder: Path, meshes: dict[str, bytes], debug_url: str
 ) -> None:
     needed = [name for name in meshes if name in line] or ["chair.glb", "throne.glb"]
     for name in needed:
         (folder / name).write_bytes(meshes[name])
+    if " jobs " in line:
+        (folder / "box.glb").write_bytes(bytes(box().export(file_type="glb")))
+        with ShapeClient(debug_url) as client:
+            job = client.submit_augment(folder / "box.glb", category="debug", count=1).id
+        line = re.sub(r"job-\w+", job, line).replace("http://127.0.0.1:8000", debug_url)
+        line += "" if "--url" in line else f" --url {debug_url}"
     piped = None
     if (source := re.match(r"cat (\S+) \| ", line)) is not None:
         piped, line = meshes[source[1]], line[source.end() :]

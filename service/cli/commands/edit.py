@@ -88,7 +88,7 @@ def edit(
         mesh = read(file, name)
         goal = None if dry_run else place
         manner = prepared(mesh, file, goal, how)
-        with output.busy(file):
+        with output.busy(file, shapes):
             made = edited(shapes, mesh, reading, wishes, manner)
         deliver(made, mesh, file, goal, output)
 

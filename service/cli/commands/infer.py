@@ -49,7 +49,7 @@ def infer(
 
     def work(file: str) -> None:
         mesh = read(file, name)
-        with output.busy(file):
+        with output.busy(file, shapes):
             report = shapes.infer(mesh, reading)
         output.document({"file": file, **report})
         if output.talks:

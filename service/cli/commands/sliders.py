@@ -23,7 +23,7 @@ from service.cli.options import (
 )
 from service.cli.output import Output
 from service.cli.run import each
-from service.cli.shapes import Options
+from service.cli.shapes import Options, Shapes
 
 FORMAT = "glb"
 
@@ -47,7 +47,8 @@ def sliders(files: tuple[str, ...], url: str | None, api_key: str | None, **give
       shape-edit sliders chair.glb -p seat_width,leg_height -o two.glb
       shape-edit sliders person.glb --joint-names mixamo --rest t_pose -o rigged.glb
     """
-    _make(files, "sliders", Where(url, api_key).shapes().sliders, given)
+    shapes = Where(url, api_key).shapes()
+    _make(files, "sliders", shapes, shapes.sliders, given)
 
 
 @click.command()
@@ -66,12 +67,14 @@ def template(files: tuple[str, ...], url: str | None, api_key: str | None, **giv
       shape-edit template chair.glb
       shape-edit template chair.glb -o - > fitted.glb
     """
-    _make(files, "template", Where(url, api_key).shapes().template, given)
+    shapes = Where(url, api_key).shapes()
+    _make(files, "template", shapes, shapes.template, given)
 
 
 def _make(
     files: tuple[str, ...],
     what: str,
+    shapes: Shapes,
     make: Callable[[Mesh, Options, Options], bytes],
     given: dict[str, Any],
 ) -> None:
@@ -80,7 +83,8 @@ def _make(
     Args:
         files: the inputs.
         what: is made of them.
-        make: makes it of a mesh, how it is to be read, and what to offer.
+        shapes: makes it.
+        make: its way to do so, of a mesh, how it is to be read, and what to offer.
         given: the other options.
     """
     reading = picked(given, READING)
@@ -93,7 +97,7 @@ def _make(
     def work(file: str) -> None:
         mesh = read(file, name, looks=True)
         place.require_room(file, mesh.name, FORMAT)
-        with output.busy(file):
+        with output.busy(file, shapes):
             data = make(mesh, reading, given)
         if place.piped(file):
             output.mesh(data)

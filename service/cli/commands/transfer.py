@@ -95,7 +95,7 @@ def transfer(
         mesh, other = (read(one, name) for one in (file, target))
         goal = None if dry_run else place
         manner = prepared(mesh, file, goal, how)
-        with output.busy(file):
+        with output.busy(file, shapes):
             made = shapes.transfer(mesh, other, reading, {**reading, **beside}, manner)
         deliver(made, mesh, file, goal, output)
 
