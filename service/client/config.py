@@ -48,12 +48,11 @@ class Config:
             fallback: the URL of the given httpx client, which goes before the environment's.
 
         Raises:
-            ValueError: when the URL or the key can't be one.
+            ValueError: when the URL or the key can't be one, or the two don't go together.
         """
         place = url or fallback or os.environ.get("SHAPE_URL") or URL
-        if httpx.URL(place).scheme not in ("http", "https"):
-            raise ValueError(f"{place!r} does not begin with http:// or https://")
         key = os.environ.get("SHAPE_API_KEY") if api_key is None else api_key
+        _require_sound(place, bool(key))
         if key and not (key.isascii() and key.isprintable() and " " not in key):
             raise ValueError("the API key holds characters that none has")
         patience = TIMEOUT if timeout is None else httpx.Timeout(timeout)
@@ -69,7 +68,24 @@ class Config:
     @property
     def shown(self) -> str:
         """The URL without what a secret could stand in."""
-        return str(httpx.URL(self.url).copy_with(userinfo=b"", query=None))
+        return str(httpx.URL(self.url).copy_with(userinfo=b""))
+
+
+def _require_sound(place: str, has_key: bool) -> None:
+    try:
+        url = httpx.URL(place)
+    except httpx.InvalidURL as error:
+        raise ValueError(f"the URL of the service is none: {error}") from error
+    shown = str(url.copy_with(userinfo=b"", query=None, fragment=None))
+    if url.scheme not in ("http", "https") or not url.host:
+        raise ValueError(f"{shown!r} does not begin with http:// or https:// and a host")
+    if url.query or url.fragment:
+        raise ValueError(f"the URL of the service ends with its path, as in {shown!r}")
+    if url.userinfo and has_key:
+        raise ValueError(
+            f"the URL of {shown!r} holds a name or password, and there is an API key: only one of "
+            "them can be sent; leave the other out (an empty api_key is none)"
+        )
 
 
 @cache

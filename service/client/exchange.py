@@ -76,22 +76,41 @@ def exchange(call: Call[T], config: Config) -> Steps[T]:
     attempts = Attempts(call.how.retry or config.retry)
     whole = False
     while True:
+        ids = ids_of(call.parts, whole)
         try:
-            return (yield from _attempt(call, config, whole))
+            return (yield from _attempt(call, config, ids))
         except MeshUnknown:
             # The service holds it no more.  Once sent whole, another such answer is final.
-            if whole or not _can_send(call.parts):
+            dropped = [
+                (part.mesh, known)
+                for part, known in zip(call.parts, ids, strict=True)
+                if known is not None and part.mesh.has_content
+            ]
+            if whole or not dropped:
                 raise
             whole = True
-            for part in call.parts:
-                if part.by_id and part.mesh.has_content:
-                    part.mesh.forget()
+            for mesh, known in dropped:
+                mesh.forget(known)
         except ServiceError as fault:
             yield Sleep(attempts.delay(fault))
 
 
-def _attempt(call: Call[T], config: Config, whole: bool) -> Steps[T]:
-    request = request_of(call, config, whole)
+def ids_of(parts: tuple[Part, ...], whole: bool = False) -> tuple[str | None, ...]:
+    """What each mesh is named by; None for one that is sent.
+
+    Decided once an attempt: other calls may share a mesh, and have it learn or lose its id.
+
+    Args:
+        whole: whether to send also what could be named.
+    """
+    return tuple(
+        None if not part.by_id or (whole and part.mesh.has_content) else part.mesh.mesh_id
+        for part in parts
+    )
+
+
+def _attempt(call: Call[T], config: Config, ids: tuple[str | None, ...]) -> Steps[T]:
+    request = request_of(call, config, ids)
     with translated(request):
         response: httpx.Response = yield Send(request)
     if not response.is_success:
@@ -131,13 +150,13 @@ def refusal(response: httpx.Response, config: Config) -> Generator[Step, Any, Se
     return malformed("an answer that is no problem document", response, body, retry_after)
 
 
-def request_of(call: Call[Any], config: Config, whole: bool = False) -> httpx.Request:
+def request_of(call: Call[Any], config: Config, ids: tuple[str | None, ...] = ()) -> httpx.Request:
     """The request.
 
     Args:
         call: what is called.
         config: where, by whom, and how.
-        whole: whether to send meshes whose id is known.
+        ids: of the call's meshes, see `ids_of`.
 
     Raises:
         OSError: when a file can't be read.
@@ -146,7 +165,7 @@ def request_of(call: Call[Any], config: Config, whole: bool = False) -> httpx.Re
     headers = {"Host": url.netloc.decode("ascii"), **config.headers(), **call.headers}
     stream = None
     if call.method == "POST":
-        stream = _form(call, whole)
+        stream = _form(call, ids)
         headers["Content-Type"] = stream.content_type
         headers["Content-Length"] = str(stream.length)
     timeout = config.timeout if call.how.timeout is None else httpx.Timeout(call.how.timeout)
@@ -177,26 +196,22 @@ def translated(request: httpx.Request) -> Iterator[None]:
     except httpx.TimeoutException as error:
         kind = type(error).__name__.removesuffix("Timeout").lower()
         raise TimedOut(f"{where}: no answer in time ({kind})") from error
-    except httpx.UnsupportedProtocol as error:
+    except (httpx.UnsupportedProtocol, httpx.LocalProtocolError) as error:
+        # Such as a header's line break: it can't be sent at all.
         raise ValueError(f"{where}: {error}") from error
     except httpx.HTTPError as error:
         raise ConnectionFailed(f"{where}: {error or type(error).__name__}") from error
 
 
-def _form(call: Call[Any], whole: bool) -> Multipart:
+def _form(call: Call[Any], ids: tuple[str | None, ...]) -> Multipart:
     texts: list[Field] = list(call.fields)
     files = []
-    for part in call.parts:
-        known = part.mesh.mesh_id
-        if part.by_id and known and not (whole and part.mesh.has_content):
+    for part, known in zip(call.parts, ids, strict=True):
+        if part.by_id is not None and known is not None:
             texts.append((part.by_id, known))
         else:
             files.append((part.name, part.mesh))
     return Multipart(texts, files, call.how.progress)
-
-
-def _can_send(parts: tuple[Part, ...]) -> bool:
-    return any(p.by_id and p.mesh.mesh_id and p.mesh.has_content for p in parts)
 
 
 def _length(response: httpx.Response) -> int | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import httpx
@@ -29,6 +29,8 @@ from service.client.retry import Attempts, passes
 from service.client.sse import Parser
 
 STREAM = "text/event-stream"
+KIND = "status"
+"""Of the events that tell of a job; others may come to be."""
 SILENCE_S = 60.0
 """The service sends comments more often than that."""
 POLL_S = 1.0
@@ -62,6 +64,7 @@ class Follow:
         self.clock = config.retry.clock
         self.began = self.clock()
         self.seen: Job | None = None
+        self.pause = 0.0
 
     def steps(self) -> Course:
         """All of it.
@@ -79,14 +82,22 @@ class Follow:
             except ServiceError as fault:
                 if not passes(fault):
                     raise
+                self.left()
                 if self.seen is not before:
                     attempts = Attempts(self.config.retry)
-                yield Sleep(self._within(attempts.delay(fault)))
+                seconds = max(attempts.delay(fault), self.pause)
+                if isinstance(fault, ProblemError) and fault.code == "streams_full":
+                    attempts = Attempts(self.config.retry)
+                    yield from self._poll(once=True)
+                else:
+                    yield Sleep(self._within(seconds))
                 continue
             if not streamed:
                 yield from self._poll()
             elif self.seen is not before:
                 attempts = Attempts(self.config.retry)
+                if not self._over():
+                    yield Sleep(self._within(self.pause or POLL_S))
             elif not self._over():
                 # A stream that ends without a word, as when the service drains.
                 yield from self._poll(once=True)
@@ -111,6 +122,16 @@ class Follow:
     def _within(self, seconds: float) -> float:
         left = self.left()
         return seconds if left is None else min(seconds, left)
+
+    def _patience(self) -> Sending:
+        """How the service is asked: for no longer than there is time."""
+        left = self.left()
+        if left is None:
+            return Sending()
+        own, retry = self.config.timeout, self.config.retry
+        read = left if own.read is None else min(own.read, left)
+        timeout = httpx.Timeout(connect=own.connect, write=own.write, pool=own.pool, read=read)
+        return Sending(timeout=timeout, retry=replace(retry, total_s=min(retry.total_s, left)))
 
     def _events(self) -> Generator[Step | Emit, Any, bool]:
         """One connection's events; False where the service has no stream of them."""
@@ -147,22 +168,29 @@ class Follow:
             self.left()
             for message in parser.feed(chunk):
                 self.last = message.id or self.last
+                if message.event != KIND:
+                    continue
                 try:
                     job = Job.model_validate_json(message.data)
                 except ValidationError as error:
                     what = "an event that is no job"
                     raise malformed(what, response, message.data.encode()) from error
-                yield from self._tell(Event(id=message.id, job=job))
+                if job != self.seen:  # it may have been asked for meanwhile
+                    yield from self._tell(Event(id=message.id, job=job))
+            if parser.retry_ms is not None:
+                self.pause = min(parser.retry_ms / 1000, self.config.retry.cap_s)
 
     def _poll(self, once: bool = False) -> Course:
         """Ask until it is finished."""
         while not self._over():
-            asking = Call("GET", calls.job_path(self.job), _with_headers, headers={"Accept": JSON})
-            job, headers = yield from exchange(asking, self.config)
+            path = calls.job_path(self.job)
+            headers = {"Accept": JSON}
+            asking = Call("GET", path, _with_headers, headers=headers, how=self._patience())
+            job, answered = yield from exchange(asking, self.config)
             if self.seen is None or job != self.seen:
                 yield from self._tell(Event(id=None, job=job))
             if not job.is_finished:
-                asked = self.config.retry.after(headers.get("retry-after"))
+                asked = self.config.retry.after(answered.get("retry-after"))
                 yield Sleep(self._within(POLL_S if asked is None else asked))
             if once:
                 return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -17,6 +18,9 @@ MESH_ID = re.compile(r"sha256-[0-9a-f]{64}")
 # A service that keeps no meshes would cost each call a refusal.
 MISSES = 3
 
+Stamp = tuple[int, int]
+"""When a file was last written, in ns, and its size in bytes."""
+
 
 class Mesh:
     """A mesh to send, which remembers the id that the service keeps it under.
@@ -25,7 +29,7 @@ class Mesh:
     Where the service keeps it no more, the client sends the content again by itself.
 
     A path is read anew at each sending, a chunk at a time.  A file object is read from where it
-    stands; where it can't be rewound it is read into memory.
+    stands; where it can't be rewound it is read into memory.  Threads and tasks may share a mesh.
 
     Args:
         source: a path, the file's bytes, or a binary file object.
@@ -46,9 +50,11 @@ class Mesh:
         self._open, own = _opener(source)
         self.name = name or own or "mesh"
         self._mesh_id: str | None = None
-        self._stamp: tuple[int, int] | None = None
         self._misses = 0
         self._path = Path(source) if isinstance(source, str | os.PathLike) else None
+        self._stamp: Stamp | None = None
+        self._sent: Stamp | None = _stamp(self._path)
+        self._lock = threading.Lock()
 
     @classmethod
     def kept(cls, mesh_id: str) -> Mesh:
@@ -64,9 +70,10 @@ class Mesh:
     @property
     def mesh_id(self) -> str | None:
         """What the service keeps it under; None when that is not known, or the file has changed."""
-        if self._path is not None and self._mesh_id and self._stamp != _stamp(self._path):
-            self._mesh_id = None
-        return self._mesh_id
+        with self._lock:
+            if self._mesh_id is not None and self._stamp != _stamp(self._path):
+                self._mesh_id = None
+            return self._mesh_id
 
     @property
     def has_content(self) -> bool:
@@ -74,15 +81,17 @@ class Mesh:
         return self._open is not None
 
     def remember(self, mesh_id: str) -> None:
-        """Name it so in later calls."""
-        if self._misses < MISSES:
-            self._mesh_id = mesh_id
-            self._stamp = _stamp(self._path) if self._path is not None else None
+        """Name what was last sent so in later calls."""
+        with self._lock:
+            if self._misses < MISSES:
+                self._mesh_id, self._stamp = mesh_id, self._sent
 
-    def forget(self) -> None:
-        """The service does not keep it: send it whole next time."""
-        self._misses += 1
-        self._mesh_id = None
+    def forget(self, mesh_id: str) -> None:
+        """The service does not keep it under this id: send it whole next time."""
+        with self._lock:
+            if self._mesh_id == mesh_id:
+                self._misses += 1
+                self._mesh_id = None
 
     @contextmanager
     def open(self) -> Iterator[BinaryIO]:
@@ -94,6 +103,7 @@ class Mesh:
         """
         if self._open is None:
             raise ValueError(f"there is no content of {self._mesh_id}")
+        self._sent = _stamp(self._path)
         with self._open() as file:
             yield file
 
@@ -128,10 +138,27 @@ def as_mesh(given: object) -> Mesh:
     raise TypeError(f"a mesh is a path, bytes, a binary file, a Mesh or a mesh_id, not {given!r}")
 
 
-@contextmanager
-def _unclosed(file: BinaryIO, at: int) -> Iterator[BinaryIO]:
-    file.seek(at)
-    yield file
+class _View(io.RawIOBase):
+    """A file from some position on, with a place of its own: several are read at the same time."""
+
+    def __init__(self, file: BinaryIO, at: int, lock: threading.Lock) -> None:
+        self._file, self._at, self._lock = file, at, lock
+
+    def read(self, size: int = -1) -> bytes:
+        with self._lock:
+            self._file.seek(self._at)
+            data = self._file.read(size)
+            self._at = self._file.tell()
+        return data
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        with self._lock:
+            self._file.seek(self._at)
+            self._at = self._file.seek(offset, whence)
+        return self._at
+
+    def tell(self) -> int:
+        return self._at
 
 
 def _opener(
@@ -154,15 +181,15 @@ def _of_file(file: BinaryIO) -> tuple[Callable[[], AbstractContextManager[Binary
     name = getattr(file, "name", None)
     own = Path(name).name if isinstance(name, str) else None
     if hasattr(file, "seekable") and file.seekable():
-        at = file.tell()
-        return lambda: _unclosed(file, at), own
+        at, lock = file.tell(), threading.Lock()
+        return lambda: _View(file, at, lock), own  # type: ignore[return-value]
     data = file.read()
     return lambda: io.BytesIO(data), own
 
 
-def _stamp(path: Path) -> tuple[int, int] | None:
+def _stamp(path: Path | None) -> Stamp | None:
     try:
-        found = path.stat()
+        found = None if path is None else path.stat()
     except OSError:
         return None
-    return found.st_mtime_ns, found.st_size
+    return None if found is None else (found.st_mtime_ns, found.st_size)

@@ -23,12 +23,17 @@ class Message:
 
 
 class Parser:
-    """Takes chunks, and gives the events that they complete."""
+    """Takes chunks, and gives the events that they complete.
+
+    Attributes:
+        retry_ms: after how long to come again when the stream ends; None before that was told.
+    """
 
     def __init__(self) -> None:
         self._text = codecs.getincrementaldecoder("utf-8-sig")("replace")
         self._rest = ""
         self._id: str | None = None
+        self.retry_ms: int | None = None
         self._clear()
 
     def _clear(self) -> None:
@@ -60,3 +65,5 @@ class Parser:
             self._event = value
         elif name == "id" and "\0" not in value:
             self._id = value
+        elif name == "retry" and value.isascii() and value.isdigit():
+            self.retry_ms = int(value[:9])

@@ -8,9 +8,11 @@ from typing import Any
 
 import httpx
 
-from service.client import Retry, ShapeClient
+from service.client import AsyncShapeClient, Retry, ShapeClient
 
 Answer = httpx.Response | Exception
+
+URL = "http://shapes.test"
 
 
 class Script:
@@ -36,13 +38,20 @@ class Script:
 
     def client(self, **given: Any) -> ShapeClient:
         """A client that this answers; jitter is always half."""
-        retry = Retry(random=lambda: 0.5, clock=lambda: self.now, **given)
-        return ShapeClient(
-            "http://shapes.test",
-            retries=retry,
-            transport=httpx.MockTransport(self),
-            sleep=self.sleep,
-        )
+        transport = httpx.MockTransport(self)
+        return ShapeClient(URL, retries=self._retry(given), transport=transport, sleep=self.sleep)
+
+    def asynchronous(self, **given: Any) -> AsyncShapeClient:
+        """The same, to await."""
+
+        async def sleep(seconds: float) -> None:
+            self.sleep(seconds)
+
+        transport = httpx.MockTransport(self)
+        return AsyncShapeClient(URL, retries=self._retry(given), transport=transport, sleep=sleep)
+
+    def _retry(self, given: dict[str, Any]) -> Retry:
+        return Retry(random=lambda: 0.5, clock=lambda: self.now, **given)
 
 
 def refused(status: int, code: str, **headers: str) -> httpx.Response:
@@ -68,9 +77,9 @@ def job(status: str, done: int = 0, **more: Any) -> dict[str, Any]:
             "links": links, **more}  # fmt: skip
 
 
-def stream(*events: Sequence[Any]) -> httpx.Response:
+def stream(*events: Sequence[Any], begins: str = ": hello\n\n") -> httpx.Response:
     """Server-sent events: pairs of an id and a job."""
     text = "".join(f"id: {n}\nevent: status\ndata: {json.dumps(j)}\n\n" for n, j in events)
     return httpx.Response(
-        200, content=(": hello\n\n" + text).encode(), headers={"content-type": "text/event-stream"}
+        200, content=(begins + text).encode(), headers={"content-type": "text/event-stream"}
     )
