@@ -12,19 +12,22 @@ import pytest
 from provoke import BOX, client_of, provokes, refused
 
 from service import pipeline
+from service.client import ShapeClient
 from service.main import create_app
 from service.settings import Settings
 
+Make = Callable[..., ShapeClient]
+
 
 @pytest.fixture
-def tight(serve: Any) -> Callable[..., Any]:
-    """Makes a service of one worker: its app and a client of it."""
+def tight(serve: Any) -> Make:
+    """Makes a service of one worker, ready to work; a client of it."""
 
-    def make(**settings: Any) -> Any:
+    def make(**settings: Any) -> ShapeClient:
         app = create_app(Settings(**{"categories": ("debug",), "workers": 1, **settings}))
         client = client_of(serve(app))
-        assert client.infer(BOX).category == "debug"
-        return app, client
+        assert client.categories()
+        return client
 
     return make
 
@@ -41,8 +44,8 @@ def slowed(monkeypatch: pytest.MonkeyPatch, work: Callable[[], Any]) -> None:
 
 
 @provokes(overloaded=429)
-def test_more_than_there_are_places(tight: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
-    _, client = tight(queue=0)
+def test_more_than_there_are_places(tight: Make, monkeypatch: pytest.MonkeyPatch) -> Any:
+    client = tight(queue=0)
     entered, release = threading.Event(), threading.Event()
 
     def wait() -> None:
@@ -71,17 +74,17 @@ def spin(seconds: float) -> None:
 
 @provokes(too_complex=422, deadline_exceeded=503)
 def test_work_that_takes_longer_than_it_may(
-    tight: Any, monkeypatch: pytest.MonkeyPatch, code: str
+    tight: Make, monkeypatch: pytest.MonkeyPatch, code: str
 ) -> Any:
-    _, client = tight(deadline_seconds=0.2)
+    client = tight(deadline_seconds=0.2)
     work = spin if code == "too_complex" else time.sleep
     slowed(monkeypatch, lambda: work(0.4))
     return refused(lambda: client.infer(BOX, units="cm"))
 
 
 @provokes(internal_error=500)
-def test_what_nothing_foresaw(tight: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
-    _, client = tight()
+def test_what_nothing_foresaw(tight: Make, monkeypatch: pytest.MonkeyPatch) -> Any:
+    client = tight()
 
     def fail() -> None:
         raise RuntimeError("a secret of the inside")
@@ -93,6 +96,6 @@ def test_what_nothing_foresaw(tight: Any, monkeypatch: pytest.MonkeyPatch) -> An
 
 
 @provokes(body_too_large=413)
-def test_a_body_over_the_limit(tight: Any) -> Any:
-    _, client = tight(max_upload_bytes=len(BOX) + 2000)
+def test_a_body_over_the_limit(tight: Make) -> Any:
+    client = tight(max_upload_bytes=len(BOX) + 2000)
     return refused(lambda: client.infer(BOX + bytes(2000)))
