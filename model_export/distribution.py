@@ -280,6 +280,14 @@ def write_entry(path: Path, entry: dict[str, Any]) -> None:
     read_card(path)
 
 
+def add_distribution(card: dict[str, Any], model: Model, shapes: Sequence[RealisticShape]) -> None:
+    """Put the entry into a card in the making, where there are shapes enough."""
+    try:
+        card["distribution"] = distribution_entry(model, fit_all(model, shapes))
+    except ValueError as error:
+        print(f"no distribution of real shapes: {error}")
+
+
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(

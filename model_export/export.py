@@ -16,6 +16,7 @@ from torch import nn
 from model_export.calibrate import sigma_scales
 from model_export.config import SHIPPED, from_plain
 from model_export.discriminate import Data, assess, build
+from model_export.distribution import add_distribution
 from model_export.evaluate import real_fits, synthetic_table
 from model_export.networks import Encoder, build_encoder, fold_batch_norm
 from model_export.onnxfile import write_network
@@ -202,6 +203,7 @@ def main() -> None:
     if shapes:
         held_out = [shape for shape in shapes if shape.held_out]
         card["metrics"]["realistic"] = real_fits(model, held_out)
+        add_distribution(card, model, shapes)
     if arguments.realistic and arguments.truth:
         judged = judge(model, arguments.realistic, read_truth(arguments.truth))
         scales = sigma_scales(judged)

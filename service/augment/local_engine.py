@@ -157,12 +157,15 @@ def _serve(plan: Plan, kind: type[Work], pipe: Connection[Any, Any]) -> None:
     """A worker's life: sources in, outcomes out, until the pipe is closed."""
     # Ctrl-C reaches all processes of a terminal; the one that asked ends the others.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        work = kind(plan)
-        pipe.send(READY)
-        while True:
-            pipe.send(work(pipe.recv()))
-    except EOFError:
-        return
-    except Exception as error:
-        pipe.send(error)
+    # A pipe that breaks is that of a run that was ended: there is nobody to tell.
+    with suppress(EOFError, BrokenPipeError, ConnectionResetError):
+        try:
+            work = kind(plan)
+            pipe.send(READY)
+            while True:
+                task = pipe.recv()
+                pipe.send(work(task))
+        except (EOFError, BrokenPipeError, ConnectionResetError):
+            raise
+        except Exception as error:
+            pipe.send(error)

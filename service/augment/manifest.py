@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -80,7 +81,7 @@ class Manifest:
     def write(self, path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write a part: all of it or nothing, and the same bytes for the same rows."""
         table = pa.Table.from_pylist(list(rows), self.schema)
-        temporary = path.with_name(f".{path.name}.tmp")
+        temporary = path.with_name(f".{path.name}.{os.getpid()}")
         parquet.write_table(table, temporary, compression="zstd", store_schema=True)
         temporary.replace(path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -70,8 +71,10 @@ class Work:
     def _written(self, task: Task, made: Source) -> Outcome:
         folder = f"{MESHES}/{task.name}"
         final = self._plan.out / folder
-        temporary = final.with_name(f".{task.name}.tmp")
-        shutil.rmtree(temporary, ignore_errors=True)
+        # Those of runs that were ended go; a worker that outlives one can't go on in them.
+        for left in final.parent.glob(f".{task.name}.*"):
+            shutil.rmtree(left, ignore_errors=True)
+        temporary = final.with_name(f".{task.name}.{os.getpid()}.tmp")
         temporary.mkdir(parents=True)
         facts, rows, ok = source_facts(made.found, made.labels), [], 0
         for variant in made.variants(self._plan.augment):
