@@ -74,9 +74,9 @@ def _allowed(name: str, error: Mapping[str, Any]) -> str:
             return f"{name} is at least {error['ctx']['ge']}."
         case "less_than_equal":
             return f"{name} is at most {error['ctx']['le']}."
-        case "string_too_short":
+        case "too_short" | "string_too_short":
             return f"{name} is not empty."
-        case "string_too_long":
+        case "too_long" | "string_too_long":
             return f"{name} has at most {error['ctx']['max_length']} characters."
         case _:
             return f"{name}: {error['msg']}."
