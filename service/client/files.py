@@ -128,7 +128,8 @@ class Archive(File):
 
     @cached_property
     def manifest(self) -> list[dict[str, Any]]:
-        """A row a variant: `index`, `file`, `edits`, `parameters`, or the `problem` it had."""
+        """A row a variant: `index`, `status`, `file`, `edits`, `parameters` and more; where it
+        could not be made, `status` is not `ok`, `file` is None, and `problem` says why."""
         with self.open() as archive:
             lines = archive.read("manifest.jsonl").decode().splitlines()
         return [json.loads(line) for line in lines if line.strip()]

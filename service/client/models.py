@@ -292,7 +292,7 @@ class Job(Model):
     expires: str
     durable: bool
     """Whether it outlives a restart of the service."""
-    problem: dict[str, Any] | None = None
+    problem: dict[str, Any] | None
     """Of a failed job: why, as a problem document."""
     links: Links
 
