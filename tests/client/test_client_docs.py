@@ -24,6 +24,10 @@ def test_the_examples_run(
     for block in BLOCKS:
         exec(compile(block, "client.md", "exec"), space)
     space["client"].close()
-    assert "unknown_parameter: chair has no parameter 'seat_with'" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "unknown_parameter: chair has no parameter 'seat_with'" in told
+    assert "1 variants/001.glb" in told
+    assert "5 of 5" in told
     made = {path.name for path in tmp_path.iterdir()}
     assert made >= {"wide.glb", "narrow.glb", "like-the-wide-one.glb", "sliders.glb", "large.glb"}
+    assert made >= {"variants", "variants.zip"}
