@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Iterator
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Generator, Iterator
 from typing import Any, TypeVar
 
 import httpx
@@ -32,7 +32,7 @@ class Driver:
         finally:
             following.close()
 
-    def events(self, steps: Generator[Step | Emit, Any, None]) -> Iterator[Event]:
+    def events(self, steps: Generator[Step | Emit, Any, None]) -> Generator[Event, None, None]:
         """All steps; what they emit, as it comes."""
         following = _Following(self)
         try:
@@ -115,7 +115,7 @@ class AsyncDriver:
         finally:
             await following.close()
 
-    async def events(self, steps: Generator[Step | Emit, Any, None]) -> AsyncIterator[Event]:
+    async def events(self, steps: Generator[Step | Emit, Any, None]) -> AsyncGenerator[Event, None]:
         """All steps; what they emit, as it comes."""
         following = _AsyncFollowing(self)
         try:

@@ -1,0 +1,1 @@
+"""The calls of the client, to await, by what they are about."""
