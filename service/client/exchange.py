@@ -113,7 +113,7 @@ def _attempt(call: Call[T], config: Config, ids: tuple[str | None, ...]) -> Step
     request = request_of(call, config, ids)
     with translated(request):
         response: httpx.Response = yield Send(request)
-    if not response.is_success:
+    if not response.is_success or _is_page(call, response):
         raise (yield from refusal(response, config))
     sink = Sink(call.how.to, call.how.download_progress, _length(response))
     try:
@@ -212,6 +212,11 @@ def _form(call: Call[Any], ids: tuple[str | None, ...]) -> Multipart:
         else:
             files.append((part.name, part.mesh))
     return Multipart(texts, files, call.how.progress)
+
+
+def _is_page(call: Call[Any], response: httpx.Response) -> bool:
+    """Whether it is some proxy's, though it says that all is well; it is no file to be written."""
+    return "Accept" in call.headers and response.headers.get("content-type", "")[:9] == "text/html"
 
 
 def _length(response: httpx.Response) -> int | None:

@@ -7,7 +7,7 @@ import httpx
 import pytest
 from client_app import Script, refused
 
-from service.client import Mesh, MeshUnknown, ShapeClient
+from service.client import AnswerMalformed, Mesh, MeshUnknown, ShapeClient
 
 UNKNOWN = "sha256-" + "0" * 64
 
@@ -90,6 +90,8 @@ def test_a_download_appears_whole_or_not_at_all(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
+    with pytest.raises(AnswerMalformed, match=r"with status 200 .* 'Log in first'"):
+        Script(httpx.Response(200, html="Log in first")).client().mesh(mesh_id, to=tmp_path / "p")
     with pytest.raises(KeyboardInterrupt):
         client.mesh(mesh_id, to=tmp_path / "other.glb", download_progress=stop)
     assert list(tmp_path.iterdir()) == [place]
