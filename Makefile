@@ -71,5 +71,5 @@ clean:  ## remove the environments
 
 .venv-ray/batch: pyproject.toml
 	test -x .venv-ray/bin/python || $(PYTHON) -m venv .venv-ray
-	.venv-ray/bin/pip install --quiet --disable-pip-version-check -e '.[batch,dev]'
+	.venv-ray/bin/pip install --quiet --disable-pip-version-check -e '.[batch,dev]' 'onnx>=1.19,<2'
 	@touch $@
