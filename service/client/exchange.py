@@ -80,13 +80,13 @@ def exchange(call: Call[T], config: Config) -> Steps[T]:
         try:
             return (yield from _attempt(call, config, ids))
         except MeshUnknown:
-            # The service holds it no more.  Once sent whole, another such answer is final.
+            # The service holds it no more.  Once all is sent whole, another such answer is final.
             dropped = [
                 (part.mesh, known)
                 for part, known in zip(call.parts, ids, strict=True)
                 if known is not None and part.mesh.has_content
             ]
-            if whole or not dropped:
+            if not dropped:
                 raise
             whole = True
             for mesh, known in dropped:

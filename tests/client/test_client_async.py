@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import aclosing, asynccontextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import aclosing, asynccontextmanager, closing
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -99,21 +99,55 @@ def test_cancelled_waiting_closes_its_connection() -> None:
     asyncio.run(course())
 
 
-def test_who_stops_waiting_by_an_error_closes_the_connection() -> None:
-    def stop(job: object) -> None:
-        raise KeyError("enough")
+class Body(httpx.AsyncByteStream, httpx.SyncByteStream):
+    """A job that goes on, and whether who hears of it has closed the answer."""
 
-    async def course() -> None:
-        async with silent(told("running")) as (server, client):
+    closed = False
+
+    def __iter__(self) -> Iterator[bytes]:
+        yield stream((1, job("running"))).content
+        yield b": so far\n\n"
+
+    async def __aiter__(self) -> AsyncIterator[bytes]:
+        for piece in self:
+            yield piece
+
+    def close(self) -> None:
+        self.closed = True
+
+    async def aclose(self) -> None:
+        self.closed = True
+
+
+def stop(*_: object) -> None:
+    raise KeyError("enough")
+
+
+def answering(body: Body) -> Script:
+    return Script(httpx.Response(200, headers={"content-type": "text/event-stream"}, stream=body))
+
+
+CALLS: dict[str, Callable[[Any], Any]] = {
+    "waiting": lambda client: client.wait("job-1", stop),
+    "downloading": lambda client: client.mesh("sha256-0", download_progress=stop),
+}
+
+
+@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
+def test_an_error_of_the_callers_closes_the_answer_at_once(call: Callable[[Any], Any]) -> None:
+    async def course() -> bool:
+        body = Body()
+        async with answering(body).asynchronous() as client:
             with pytest.raises(KeyError):
-                await client.wait("job-1", stop)
-            await asyncio.wait_for(server.left.wait(), 20)
+                await call(client)
+            return body.closed
 
-    gc.disable()
-    try:
-        asyncio.run(course())
-    finally:
-        gc.enable()
+    assert asyncio.run(course())
+    body = Body()
+    with answering(body).client() as client:
+        with pytest.raises(KeyError) as caught:
+            call(client)
+        assert body.closed, caught.traceback  # whose frames hold on to all they had
 
 
 def test_who_stops_listening_closes_the_connection() -> None:
@@ -126,6 +160,12 @@ def test_who_stops_listening_closes_the_connection() -> None:
             await asyncio.wait_for(server.left.wait(), 20)
 
     asyncio.run(course())
+    body = Body()
+    with answering(body).client() as client:
+        with closing(client.events("job-1")) as events:
+            assert next(events).job.status == "running"
+            assert not body.closed
+        assert body.closed
 
 
 def test_a_time_limit_of_asyncio_is_one() -> None:

@@ -154,6 +154,17 @@ def test_a_file_that_changes_while_it_is_read_is_not_named(tmp_path: Path) -> No
     assert mesh.mesh_id is None
 
 
+def test_a_file_is_named_by_what_was_sent_last(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0")
+    mesh = Mesh(path)
+    path.write_text("v 0 0 0 and more")
+    with pytest.raises(Exception, match="empty_mesh"):
+        Script(refused(422, "empty_mesh")).client().infer(mesh)
+    mesh.remember(KNOWN)
+    assert mesh.mesh_id == KNOWN
+
+
 def test_a_file_that_shrinks_is_an_error_of_files(tmp_path: Path) -> None:
     path = tmp_path / "a.obj"
     path.write_bytes(bytes(1 << 20))
