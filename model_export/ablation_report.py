@@ -26,8 +26,17 @@ PAPER = {
 TITLES = {
     "losses": "With real shapes in each batch (L_sim on)",
     "losses_without_real": "Without real shapes (gamma 0)",
-    "variations": "Edit laws and the norm of L_sem, both losses and the editing branch",
+    "variations": "Both losses, the editing branch and real shapes, with one thing changed",
 }
+TABLES = {
+    "losses": "losses",
+    "real": "losses_without_real",
+    "losses_without_real": "losses_without_real",
+    "edits": "variations",
+    "norms": "variations",
+    "longer": "variations",
+}
+"""Of the groups of runs: which of `TITLES` they stand under."""
 
 Line = dict[str, Any]
 
@@ -44,20 +53,16 @@ def statistics(lines: Sequence[Line]) -> dict[str, Any]:
 
 
 def summary(lines: Sequence[Line]) -> dict[str, dict[str, Any]]:
-    """Statistics of every row of every table that has a run."""
-    tables: dict[str, dict[str, Any]] = {}
-    for line in lines:
-        tables.setdefault(_table(line), {}).setdefault(_name(line), []).append(line)
+    """Statistics of every row of every table that has a run; the paper's rows in its order."""
+    order = list(PAPER)
+    runs: dict[str, dict[str, list[Line]]] = {}
+    for line in sorted(lines, key=lambda line: [*order, line["row"]].index(line["row"])):
+        runs.setdefault(TABLES[line["group"]], {}).setdefault(_name(line), []).append(line)
     return {
-        title: {name: statistics(found) for name, found in tables[title].items()}
-        for title in TITLES
-        if title in tables
+        table: {name: statistics(found) for name, found in runs[table].items()}
+        for table in TITLES
+        if table in runs
     }
-
-
-def _table(line: Line) -> str:
-    table = {"edits": "variations", "norms": "variations", "real": "losses_without_real"}
-    return table.get(line["group"], line["group"])
 
 
 def _name(line: Line) -> str:
@@ -77,15 +82,13 @@ def tables(lines: Sequence[Line]) -> str:
 def table(rows: dict[str, Any]) -> str:
     """Markdown of one table; the paper's figures stand beside the rows that it has."""
     limits = " / ".join(f"{limit:g}"[1:] for limit in THRESHOLDS)
-    out = [f"| | runs | edited shapes, {limits} | paper | not edited, {limits} | real distance |",
-           "|---|---|---|---|---|---|"]  # fmt: skip
+    out = [f"| | runs | edited shapes, {limits} | paper | not edited, {limits} "
+           "| real distance, mean / median |", "|---|---|---|---|---|---|"]  # fmt: skip
     for name, row in rows.items():
         paper = " / ".join(map(str, PAPER[name])) if name in PAPER else "-"
-        distance = row["real_distance_median"]
-        spread = f" ± {distance['sd']:.4f}" if row["seeds"] > 1 else ""
         out.append(
             f"| {name} | {row['seeds']} | {_shares(row, 'edited_within_percent')} | {paper} "
-            f"| {_shares(row, 'within_percent')} | {distance['mean']:.4f}{spread} |"
+            f"| {_shares(row, 'within_percent')} | {_distances(row)} |"
         )
     return "\n".join(out)
 
@@ -97,6 +100,14 @@ def _shares(row: dict[str, Any], name: str) -> str:
         return " / ".join(f"{mean:.1f}" for mean in means)
     pairs = zip(means, deviations, strict=True)
     return " / ".join(f"{mean:.1f} ± {deviation:.1f}" for mean, deviation in pairs)
+
+
+def _distances(row: dict[str, Any]) -> str:
+    """Mean and median distance to held-out real shapes, each with its spread over the runs."""
+    figures = [row["real_distance_mean"], row["real_distance_median"]]
+    if row["seeds"] == 1:
+        return " / ".join(f"{figure['mean']:.4f}" for figure in figures)
+    return " / ".join(f"{figure['mean']:.4f} ± {figure['sd']:.4f}" for figure in figures)
 
 
 def settings(lines: Sequence[Line]) -> str:

@@ -49,13 +49,14 @@ def test_other_rows_differ_in_one_thing_from_the_whole_model() -> None:
     assert others["edits", "set"] == replace(base, edit="set")
     assert others["edits", "cycle"] == replace(base, edit="cycle")
     assert others["norms", "l1"] == replace(base, norm="l1")
+    assert others["longer", "3 times the steps"] == replace(base, steps=3 * base.steps)
     configs = [row.config for row in rows(base)]
     assert all(configs.count(config) == 1 for config in configs)
 
 
 def test_what_matters_most_runs_first(tiny: Config) -> None:
     found = list(planned(tiny, GROUPS, 3))
-    assert len(found) == 3 * (4 + 4 + 2 + 1)
+    assert len(found) == 3 * (4 + 4 + 2 + 1 + 1)
     assert [row.config.seed for row in found[:12]] == [0] * 4 + [1] * 4 + [2] * 4
     assert {row.group for row in found[:12]} == {"losses"}
     assert [(row.group, row.name) for row in found[12:15]] == [("real", "L_sem + L_rec")] * 3

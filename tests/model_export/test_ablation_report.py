@@ -34,6 +34,7 @@ LINES = [
     line("real", "L_sem + L_rec", 0, [50.0, 81.0, 93.0], 0.031),
     line("edits", "cycle", 0, [41.0, 82.0, 94.0], 0.021),
     line("norms", "l1", 0, [20.0, 60.0, 70.0], 0.026),
+    line("longer", "3 times the steps", 0, [60.0, 90.0, 98.0], 0.019),
 ]
 
 
@@ -49,8 +50,12 @@ def test_a_row_has_mean_and_spread_over_its_seeds() -> None:
 def test_runs_are_put_into_tables_by_their_groups() -> None:
     found = summary(LINES)
     assert list(found) == ["losses", "losses_without_real", "variations"]
-    assert list(found["losses"]) == ["L_sem + L_rec", "L_sem"]
-    assert list(found["variations"]) == ["edits: cycle", "norm of L_sem: l1"]
+    assert list(found["losses"]) == ["L_sem", "L_sem + L_rec"]
+    assert list(found["variations"]) == [
+        "edits: cycle",
+        "norm of L_sem: l1",
+        "3 times the steps",
+    ]
     assert list(summary(LINES[:2])) == ["losses"]
 
 
@@ -59,19 +64,20 @@ def test_the_papers_figures_stand_beside_its_rows() -> None:
     assert "edited shapes, .01 / .02 / .03" in text
     assert (
         "| L_sem + L_rec | 2 | 42.0 ± 2.8 / 80.0 ± 0.0 / 91.0 ± 1.4 | 40.3 / 82.2 / 95.4 "
-        "| 21.0 ± 1.4 / 40.0 ± 0.0 / 45.5 ± 0.7 | 0.0210 ± 0.0014 |"
+        "| 21.0 ± 1.4 / 40.0 ± 0.0 / 45.5 ± 0.7 | 0.0420 ± 0.0028 / 0.0210 ± 0.0014 |"
     ) in text
     assert "| L_sem | 1 | 30.0 / 70.0 / 80.0 | 35.2 / 72.3 / 87.2 " in text
+    assert "15.0 / 35.0 / 40.0 | 0.0500 / 0.0250 |" in text
     # What the variations vary stands above them.
-    varied = text[text.index("Edit laws") :]
+    varied = text[text.index("one thing changed") :]
     assert varied.index("multiply; norm of L_sem: l2 | 2 | 42.0") < varied.index("edits: cycle")
     assert "| norm of L_sem: l1 | 1 | 20.0 / 60.0 / 70.0 | - |" in varied
 
 
 def test_the_settings_are_told() -> None:
     said = settings(LINES)
-    assert said.startswith("6 runs of 9 steps of 16 clouds of 512 points, learning rate 0.001")
-    assert "head the paper's, 0.6 hours together, CPU, threads: 1" in said
+    assert said.startswith("7 runs of 9 steps of 16 clouds of 512 points, learning rate 0.001")
+    assert "head the paper's, 0.7 hours together, CPU, threads: 1" in said
 
 
 def test_the_command_line_prints_and_writes_figures_for_the_card(
