@@ -12,8 +12,7 @@ from service.api.context import Shared
 from service.api.etags import held, not_modified, strong
 from service.api.problems import documented
 from service.api.schemas import TAG_HEADERS, Categories, Category
-from service.encode.installed import Installed
-from service.encode.versions import explain_unknown, full_name
+from service.encode.versions import explain_unknown
 from service.errors import NotFound
 
 # What is installed may change at any time.
@@ -44,7 +43,7 @@ router = APIRouter(tags=["categories"])
 async def list_categories(request: Request, shared: Shared) -> Response:
     installed = await shared.readiness.ready()
     names = sorted(installed.models)
-    return _answer(request, {"categories": [_describe(installed, name) for name in names]})
+    return _answer(request, {"categories": [installed.describe(name) for name in names]})
 
 
 @router.get(
@@ -64,7 +63,7 @@ async def get_category(request: Request, name: str, shared: Shared) -> Response:
     if name not in installed.named:
         detail, names = explain_unknown(installed.named, name)
         raise NotFound("unknown_category", detail, f"There are {names}.")
-    return _answer(request, _describe(installed, name))
+    return _answer(request, installed.describe(name))
 
 
 def _answer(request: Request, document: dict[str, Any]) -> Response:
@@ -75,19 +74,3 @@ def _answer(request: Request, document: dict[str, Any]) -> Response:
         return not_modified(tag, _CACHING)
     answer.headers["ETag"] = tag
     return answer
-
-
-def _describe(installed: Installed, name: str) -> dict[str, Any]:
-    """What is said of the category, or of a version of it."""
-    model = installed.named[name]
-    default = installed.models[model.name]
-    versions = [
-        {
-            "name": full_name(own),
-            "version": own.version,
-            "digest": own.digest,
-            "default": own is default,
-        }
-        for own in installed.versions[model.name]
-    ]
-    return {**model.describe(), "versions": versions}

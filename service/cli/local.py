@@ -24,7 +24,7 @@ from service.edits import parse_edits
 from service.encode.catalog import Catalog
 from service.encode.installed import Installed
 from service.encode.model import SHIPPED, load_models
-from service.encode.versions import AT, explain_unknown, full_name
+from service.encode.versions import AT, explain_unknown
 from service.errors import NotFound, ShapeError
 from service.mesh.frame import AUTO
 from service.requests import EditOptions, InferOptions, SliderOptions, TransferOptions, Upload
@@ -125,7 +125,7 @@ class Local:
     def categories(self) -> list[dict[str, Any]]:
         with told():
             installed = self.installed(AUTO)
-            return [describe(installed, name) for name in sorted(installed.models)]
+            return [installed.describe(name) for name in sorted(installed.models)]
 
     def category(self, name: str) -> dict[str, Any]:
         with told():
@@ -133,7 +133,7 @@ class Local:
             if name not in installed.named:
                 detail, names = explain_unknown(installed.named, name)
                 raise NotFound("unknown_category", detail, f"There are {names}.")
-            return describe(installed, name)
+            return installed.describe(name)
 
     def installed(self, category: str) -> Installed:
         """The models that a category needs: its own, or all where it is none that is known.
@@ -188,22 +188,6 @@ class Local:
                 "Name categories that come along in CATEGORIES, or a folder in MODELS_DIR.",
             )
         return installed
-
-
-def describe(installed: Installed, name: str) -> dict[str, Any]:
-    """What is said of a category, as `GET /categories/{name}` has it."""
-    model = installed.named[name]
-    default = installed.models[model.name]
-    versions = [
-        {
-            "name": full_name(own),
-            "version": own.version,
-            "digest": own.digest,
-            "default": own is default,
-        }
-        for own in installed.versions[model.name]
-    ]
-    return {**model.describe(), "versions": versions}
 
 
 def upload(mesh: Mesh) -> Upload:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from service.encode.basemodel import Model
 from service.encode.versions import full_name, newest_first
@@ -77,6 +78,21 @@ class Installed:
         versions."""
         several = [models for models in self.versions.values() if len(models) > 1]
         return sorted([*self.models, *(full_name(model) for own in several for model in own)])
+
+    def describe(self, name: str) -> dict[str, Any]:
+        """What is told of a category, or of a version of it, by one of `named`'s names."""
+        model = self.named[name]
+        default = self.models[model.name]
+        versions = [
+            {
+                "name": full_name(own),
+                "version": own.version,
+                "digest": own.digest,
+                "default": own is default,
+            }
+            for own in self.versions[model.name]
+        ]
+        return {**model.describe(), "versions": versions}
 
 
 def _missing(
