@@ -16,7 +16,7 @@ from starlette.formparsers import MultiPartParser
 
 from service.api.keeping import owner_of
 from service.api.names import parse_names
-from service.augment.options import LARGEST_SEED, MOST, AugmentOptions
+from service.augment.options import MOST, AugmentOptions
 from service.errors import InvalidRequest, UnsupportedFormat
 from service.finding import blaming
 from service.requests import EditOptions, InferOptions, SliderOptions, TransferOptions, Upload
@@ -25,6 +25,9 @@ from service.store.meshstore import MeshStore
 # Uploads are bounded and are read into memory anyway: keep them off the disk, so that a container
 # with a read-only root needs no temporary folder.
 MultiPartParser.spool_max_size = 1 << 62
+
+LARGEST_SEED = 2**53 - 1
+"""What every program reads from JSON as it is."""
 
 FORM_TYPES = ("multipart/form-data", "application/x-www-form-urlencoded")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import Header
+from pydantic import StringConstraints
 from pydantic.json_schema import SkipJsonSchema
 from starlette.requests import Request
 
@@ -17,13 +18,13 @@ Prefer = Annotated[
         examples=[RESPOND_ASYNC],
     ),
 ]
+Key = Annotated[str, StringConstraints(min_length=1, max_length=255, pattern="^[!-~]+$")]
 IdempotencyKey = Annotated[
-    str | SkipJsonSchema[None],
+    Key | SkipJsonSchema[None],
     Header(
         description="With `Prefer: respond-async`: the same key gives the same job again, however "
         "often the request is sent.",
-        min_length=1,
-        max_length=255,
+        examples=["2f9c4be1"],
     ),
 ]
 

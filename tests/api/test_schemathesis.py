@@ -39,6 +39,7 @@ EDITS = [{"width": {"scale": 1.5}}, {"height": {"scale": 0.8}, "width": {"add": 
 WORDS = {
     "category": ["auto", "debug"],
     "edits": [json.dumps(edits) for edits in EDITS],
+    "variants": [json.dumps(EDITS), "[{}]"],
     "constraints": ['{"depth": {"max": 1e6}}', '{"depth": {"min": 1e-6}}'],
     "keep": ["floor", "center"],
     "parameters": ["width", '["height", "depth"]'],
@@ -101,8 +102,9 @@ def test_any_request(case: Case, url: str, session: requests.Session, mesh_id: s
         else:
             leave_one_fault(case.body)
         # Its fault may be in the mesh, or that there is nothing at all.
-        if positive or (case.body and not {"mesh", "mesh_id"} & set(case.body)):
-            give_mesh(case.body, number, mesh_id)
+        for part in parts(case):
+            if positive or (case.body and not {part, by_id(part)} & {*case.body}):
+                give_mesh(case.body, part, number, mesh_id)
     headers = {"Accept": ("*/*", "application/json")[number % 2]}
     case.call_and_validate(base_url=url, session=session, headers=headers)
 
@@ -117,9 +119,14 @@ def test_any_file(case: Case, url: str, session: requests.Session) -> None:
         mesh = bytearray(MESHES[number % len(MESHES)])
         for step in range(number % 7):
             mesh[(number * (step + 1)) % len(mesh)] ^= number >> step & 255
-        case.body["mesh"] = Binary(bytes(mesh[: number % (2 * len(mesh))]))
+        for part in parts(case):
+            case.body[part] = Binary(bytes(mesh[: number % (2 * len(mesh))]))
     unaccepted = CHECKS.get_one("positive_data_acceptance")
-    case.call_and_validate(base_url=url, session=session, excluded_checks=[unaccepted])
+    # A job would be accepted, and fail when the mesh is read.
+    at_once = {"prefer": "wait"}
+    case.call_and_validate(
+        base_url=url, session=session, headers=at_once, excluded_checks=[unaccepted]
+    )
 
 
 @schema.parametrize()
@@ -140,9 +147,13 @@ def draw(case: Case) -> int:
 def say_what_makes_sense(case: Case, number: int) -> None:
     """Put words that go with the meshes into a form."""
     form = case.body
-    form.pop("mesh", None)
-    form.pop("mesh_id", None)
-    if case.operation.path == "/edit" and "constraints" not in form:
+    for part in parts(case):
+        form.pop(part, None)
+        form.pop(by_id(part), None)
+    if "variants" in form:
+        form.pop("edits", None)
+        form.pop("constraints", None)
+    elif case.operation.path == "/edit" and "constraints" not in form:
         form.setdefault("edits", "{}")
     if form.get("up", "auto")[1:] == form.get("front", "auto")[1:]:
         form.pop("front", None)
@@ -160,9 +171,19 @@ def leave_one_fault(form: dict[str, Any]) -> None:
             form[name] = "?"
 
 
-def give_mesh(form: dict[str, Any], number: int, mesh_id: str) -> None:
+def parts(case: Case) -> tuple[str, ...]:
+    """The files of an operation's form."""
+    return ("source", "target") if case.operation.path == "/transfer" else ("mesh",)
+
+
+def by_id(part: str) -> str:
+    """The field that stands in for a file."""
+    return "mesh_id" if part == "mesh" else f"{part}_mesh_id"
+
+
+def give_mesh(form: dict[str, Any], part: str, number: int, mesh_id: str) -> None:
     """Put a mesh into a form, or the id of one."""
     if number % 3:
-        form["mesh"] = Binary(MESHES[number % len(MESHES)])
+        form[part] = Binary(MESHES[number % len(MESHES)])
     else:
-        form["mesh_id"] = mesh_id
+        form[by_id(part)] = mesh_id
