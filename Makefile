@@ -18,7 +18,7 @@ test: .venv/dev chromium  ## lint, type-check and test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadfile
 
 # Ray is large, and what it does is tested apart, in an environment of its own.
 test-ray: .venv-ray/batch  ## test augmentation on a Ray cluster of this machine

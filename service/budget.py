@@ -25,6 +25,11 @@ class Budget:
         of all, or less."""
         return min(256 * MEBIBYTE, self.bytes // 8) if asked is None else asked
 
+    @property
+    def jobs(self) -> int:
+        """Bytes for jobs that no disk holds: a 64th of all, lest meshes lose their room to them."""
+        return min(256 * MEBIBYTE, self.bytes // 64)
+
     def vertices(self, workers: int, held: int) -> int:
         """Of meshes that all workers can work on at once, beside so many bytes that are held."""
         room = self.bytes - AT_REST_BYTES - held

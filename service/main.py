@@ -142,6 +142,7 @@ def _context(settings: Settings) -> Context:
     inferences_held = budget.share(settings.inference_cache_bytes)
     bodies_held = budget.share(settings.max_pending_bytes)
     held = meshes_held + inferences_held + bodies_held
+    kept = _store(settings, meshes_held)
     job_store = _job_store(settings, budget)
     if not job_store.durable:
         held += job_store.bounds.bytes
@@ -166,7 +167,6 @@ def _context(settings: Settings) -> Context:
         lambda: pool.queued > 0 or pool.working >= pool.count,
         lambda: readiness.draining,
     )
-    kept = _store(settings, meshes_held)
     jobs = Jobs(job_store, Runner(job_store, around))
     return Context(kept, inferences, readiness, pool, admission, Metrics(), jobs)
 
@@ -175,7 +175,7 @@ def _job_store(settings: Settings, budget: Budget) -> JobStore:
     folder = settings.jobs_dir
     if folder is None and settings.store_dir is not None:
         folder = settings.store_dir / JOBS_FOLDER
-    most = settings.jobs_bytes or (budget.share(None) if folder is None else JOBS_BYTES)
+    most = settings.jobs_bytes or (budget.jobs if folder is None else JOBS_BYTES)
     return JobStore(folder, Bounds(settings.jobs, most, settings.job_seconds))
 
 

@@ -101,8 +101,8 @@ class Settings(BaseSettings):
 
     jobs_bytes: PositiveInt | None = None
     """What jobs and their results may take, in bytes, half of it of one API key's owner; what does
-    not fit is answered with 429, or 413 if it never will. By default 1 GiB in a folder, and in
-    memory as for MESH_CACHE_BYTES."""
+    not fit is answered with 429, or 413 if it never will. By default 1 GiB in a folder; in
+    memory 256 MiB, or a 64th of what the container may use if that is less."""
 
     job_seconds: PositiveFloat = 86400.0
     """How long a job and its result are kept after its end, in seconds."""

@@ -17,6 +17,8 @@ from service.api.workers import Workers
 from service.encode.installed import Installed
 from service.errors import ModelFault
 from service.inferences import Inferences
+from service.jobs.jobs import Jobs
+from service.jobs.store import Bounds, JobStore
 from service.requests import Upload
 from service.store.meshstore import MeshStore, open_store
 
@@ -50,7 +52,10 @@ def mirrored(store: MeshStore, *looks: Installed | Exception) -> tuple[Context, 
     workers = Workers(2)
     readiness = Readiness(Looks(*looks))
     admission = Admission(workers, 3, 1000)
-    context = Context(store, Inferences(1000), readiness, workers, admission, Metrics())
+    job_store = JobStore(None, Bounds(10, 1000, 60.0))
+    runner: Any = SimpleNamespace(made={("edit", "ok"): 3}, ended={("edit", "succeeded"): 1})
+    jobs = Jobs(job_store, runner)
+    context = Context(store, Inferences(1000), readiness, workers, admission, Metrics(), jobs)
     registry = CollectorRegistry()
     registry.register(Mirror(context))
 

@@ -17,7 +17,8 @@ from service.settings import Settings
 
 @pytest.fixture(autouse=True)
 def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("SHAPE_URL", "SHAPE_API_KEY", "MODELS_DIR", "BODY_MODEL", "DEFAULT_MODELS"):
+    own = ("SHAPE_URL", "SHAPE_API_KEY", "MODELS_DIR", "BODY_MODEL", "DEFAULT_MODELS", "COLUMNS")
+    for name in own:
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("CATEGORIES", "debug")
 
