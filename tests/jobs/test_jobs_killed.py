@@ -4,49 +4,27 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from own_process import Served, running
 
-Start = Callable[[], tuple[subprocess.Popen[bytes], httpx.Client]]
+Start = Callable[[], Served]
 
 MANY = [{"seat_width": {"scale": 1 + index / 1000}} for index in range(300)]
-
-
-@contextmanager
-def running(jobs: Path, log: Path) -> Iterator[tuple[subprocess.Popen[bytes], httpx.Client]]:
-    """The service with a folder of jobs, and a client of it."""
-    command = [sys.executable, "-m", "service", "--host", "127.0.0.1", "--port", "0"]
-    environment = {**os.environ, "JOBS_DIR": str(jobs), "DRAIN_SECONDS": "0"}
-    with log.open("wb") as errors:
-        process = subprocess.Popen(command, env=environment, stderr=errors)
-    try:
-        until = time.monotonic() + 60
-        while not (found := re.search(r"running on (http://[0-9.:]+)", log.read_text())):
-            assert process.poll() is None, log.read_text()
-            assert time.monotonic() < until, log.read_text()
-            time.sleep(0.05)
-        with httpx.Client(base_url=found[1], timeout=60, trust_env=False) as client:
-            yield process, client
-    finally:
-        process.kill()
-        process.wait()
 
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Start]:
     with ExitStack() as stack:
         yield lambda: stack.enter_context(
-            running(tmp_path / "jobs", tmp_path / f"{time.monotonic_ns()}.log")
+            running(tmp_path / f"{time.monotonic_ns()}.log", JOBS_DIR=str(tmp_path / "jobs"))
         )
 
 

@@ -4,48 +4,28 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx
 import pytest
 import trimesh
+from own_process import Served, running
 
-Start = Callable[[Path], tuple[subprocess.Popen[bytes], httpx.Client]]
-
-
-@contextmanager
-def running(store: Path, log: Path) -> Iterator[tuple[subprocess.Popen[bytes], httpx.Client]]:
-    """The service with a store, and a client of it."""
-    command = [sys.executable, "-m", "service", "--host", "127.0.0.1", "--port", "0"]
-    environment = {**os.environ, "STORE_DIR": str(store), "DRAIN_SECONDS": "0", "QUEUE": "9"}
-    with log.open("wb") as errors:
-        process = subprocess.Popen(command, env=environment, stderr=errors)
-    try:
-        until = time.monotonic() + 60
-        while not (found := re.search(r"running on (http://[0-9.:]+)", log.read_text())):
-            assert process.poll() is None, log.read_text()
-            assert time.monotonic() < until, log.read_text()
-            time.sleep(0.05)
-        with httpx.Client(base_url=found[1], timeout=60, trust_env=False) as client:
-            yield process, client
-    finally:
-        process.kill()
-        process.wait()
+Start = Callable[[Path], Served]
 
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Start]:
     with ExitStack() as stack:
         yield lambda store: stack.enter_context(
-            running(store, tmp_path / f"{time.monotonic_ns()}.log")
+            running(tmp_path / f"{time.monotonic_ns()}.log", STORE_DIR=str(store), QUEUE="9")
         )
 
 
