@@ -53,7 +53,7 @@ def test_a_wrong_option_is_told_with_what_is_allowed(
         ("count", "ten", "count is a whole number."),
         ("count", "9" * 5000, "count is a whole number."),
         ("seed", "-1", "seed is at least 0."),
-        ("seed", str(2**63), f"seed is at most {2**63 - 1}."),
+        ("seed", str(2**53), f"seed is at most {2**53 - 1}."),
         ("strength", "1.5", "strength is at most 1.0."),
         ("strength", "some", "strength is a number."),
         ("strength", "nan", "strength is at most 1.0."),
