@@ -11,6 +11,8 @@ Faces = NDArray[np.int64]
 
 SHORT = 1e-7
 """Edges are no shorter than this to a ratio."""
+SLENDER = 5.0
+"""The largest cotangent of an angle: slivers would drown all else."""
 
 
 def edges_of(faces: Faces) -> Faces:
@@ -42,7 +44,8 @@ def laplacian(vertices: Array, faces: Faces) -> csr_array:
         u, v = vertices[b] - vertices[a], vertices[c] - vertices[a]
         area = np.linalg.norm(np.cross(u, v), axis=1)
         wide = area > 1e-12
-        half = np.where(wide, 0.5 * np.einsum("fc,fc->f", u, v) / np.where(wide, area, 1.0), 0.0)
+        cotangent = np.einsum("fc,fc->f", u, v) / np.where(wide, area, 1.0)
+        half = np.where(wide, np.clip(cotangent, -SLENDER, SLENDER) / 2, 0.0)
         for i, j, sign in ((b, c, -1), (c, b, -1), (b, b, 1), (c, c, 1)):
             rows.append(i)
             columns.append(j)

@@ -3,8 +3,9 @@
 1. The mesh is welded and cut into connected pieces (`weld`); parts that are measured from the
    hub's side begin there (`roots`), and round and tapered ones are what they are (`loft`).
 2. Unit coordinates in each part are straightened along the mesh's own legs and back (`spine`).
-3. Pieces that belong to one group of parts follow it as a whole (`pieces`); of others each vertex
-   follows the parts that it is near (`proximity`, `seams`, `discord`).
+3. Pieces that belong to one group of parts follow it as a whole (`pieces`), but for their rounded
+   edges (`rims`); of others each vertex follows the parts that it is near (`proximity`, `seams`,
+   `discord`).
 4. Beyond a part stretch ends (`clamp`), and mirrored parts share what is between them (`shares`).
 """
 
@@ -23,12 +24,13 @@ from service.deform.groups import Group, hub_parts, mirror_groups
 from service.deform.loft import lofts
 from service.deform.pieces import Votes, touching_pieces, vote
 from service.deform.proximity import BAND, Boxes, blocks, group_distance, nearness
+from service.deform.rims import Rim, find_rims
 from service.deform.roots import rooted
 from service.deform.seams import Seams, flush_seams
 from service.deform.shares import Blocks, all_shares
 from service.deform.spine import straighten
 from service.deform.spinefit import Spine
-from service.deform.weld import Welded, weld
+from service.deform.weld import weld
 from service.template.affine import AffineTemplate
 
 Array = NDArray[np.float64]
@@ -51,31 +53,6 @@ def bind(
         f: ``[d]`` fitted parameters, in the same scale.
         t: ``[3]`` where the template's origin lies.
     """
-    near = _near(vertices, faces, template, f, t)
-    compiler = Compiler(near.fit.template, near.fit.boxes, near.fit.groups, len(near.u))
-    for rows in blocks(len(near.u)):
-        compiler.add(rows, *near.of(rows))
-    return compiler.binding(near.welded)
-
-
-def part_weights(
-    vertices: Array, faces: NDArray[np.int64], template: AffineTemplate, f: Array, t: Array
-) -> Array32:
-    """``[V, P]`` how far vertices follow each of the template's parts, one in sum; as `bind`."""
-    near = _near(vertices, faces, template, f, t)
-    weights = np.zeros((len(near.u), near.u.shape[1]), np.float32)
-    for rows in blocks(len(near.u)):
-        _, shares, groups, _, _ = near.of(rows)
-        for index, group in enumerate(near.fit.groups):
-            members = list(group.members)
-            share = shares[:, members] if len(members) > 1 else 1.0
-            weights[rows, members] = groups[:, index, None] * share
-    return weights[near.welded.of]
-
-
-def _near(
-    vertices: Array, faces: NDArray[np.int64], template: AffineTemplate, f: Array, t: Array
-) -> _Near:
     welded = weld(np.asarray(vertices, np.float64), np.asarray(faces, np.int64))
     f = np.asarray(f, np.float64)
     x = welded.vertices - np.asarray(t, np.float64)
@@ -91,7 +68,14 @@ def _near(
         fit.boxes, hubs,
     )  # fmt: skip
     shares = all_shares(u, fit.boxes, fit.groups, Blocks(welded.piece, high - low, votes.whole))
-    return _Near(welded, fit, u, to_group, shares, _Following.of(fit, spines, votes))
+    rims = find_rims(welded, u, votes, fit.groups, fit.boxes)
+    following = _Following.of(fit, spines, votes, rims)
+    compiler = Compiler(fit.template, fit.boxes, fit.groups, len(x))
+    for rows in blocks(len(x)):
+        compiler.add(
+            rows, *following.of_some(u[rows], welded.piece[rows], to_group[rows], shares[rows])
+        )
+    return compiler.binding(welded)
 
 
 @dataclass(frozen=True)
@@ -117,6 +101,7 @@ class _Following:
     Attributes:
         groups: of the parts.
         votes: of the pieces.
+        rims: of pieces that have some.
         moves: of the parts with the parameters.
         limits, reach: of the parts' stretch; see `saturate`.
         seams: where parts meet flush.
@@ -125,6 +110,7 @@ class _Following:
 
     groups: list[Group]
     votes: Votes
+    rims: list[Rim]
     moves: Moves
     limits: Array32
     reach: Array32
@@ -132,11 +118,12 @@ class _Following:
     offered: Array
 
     @classmethod
-    def of(cls, fit: _Fit, spines: dict[int, Spine], votes: Votes) -> _Following:
+    def of(cls, fit: _Fit, spines: dict[int, Spine], votes: Votes, rims: list[Rim]) -> _Following:
         limits, reach = stretch_limits(fit.boxes, fit.groups, spines)
         seams = flush_seams(fit.template, fit.boxes, spines)
         offered = np.where(fit.template.public, fit.f, 0.0)
-        return cls(fit.groups, votes, Moves.of(fit.template), limits, reach, seams, offered)
+        moves = Moves.of(fit.template)
+        return cls(fit.groups, votes, rims, moves, limits, reach, seams, offered)
 
     def of_some(
         self, u: Array32, piece: NDArray[np.int64], to_group: Array32, shares: Array32
@@ -149,7 +136,12 @@ class _Following:
             to_group: ``[n, G]`` distances to the groups.
             shares: ``[n, P]`` of the parts in their groups.
         """
+        if self.rims:
+            u = u.copy(order="K")
+        held = [(rim, *rim.hold(u, piece)) for rim in self.rims]
         local, gains = saturate(u, self.limits, self.reach)
+        for rim, rows, slope in held:
+            gains[rows, rim.part, rim.axis] *= slope
         votes, present = self.votes, np.flatnonzero(np.bincount(piece))
         for part, axis in np.argwhere((votes.keep[present] < 1.0).any(axis=0)):
             keep, anchor = (m[:, part, axis][piece] for m in (votes.keep, votes.anchor))
@@ -165,28 +157,3 @@ class _Following:
             np.copyto(near, nearness(to_group, band).T, where=free)
         near = near.T
         return fields, shares, near, local, gains
-
-
-@dataclass(frozen=True)
-class _Near:
-    """A mesh without its seams, and what tells how it follows the parts.
-
-    Attributes:
-        welded, fit: the mesh and the template.
-        u: ``[n, P, 3]`` straightened unit coordinates.
-        to_group: ``[n, G]`` distances to the groups.
-        shares: ``[n, P]`` of the parts in their groups.
-        following: the rest of it.
-    """
-
-    welded: Welded
-    fit: _Fit
-    u: Array32
-    to_group: Array32
-    shares: Array32
-    following: _Following
-
-    def of(self, rows: slice) -> tuple[list[Field], Array32, Array32, Array32, Array32]:
-        """See `_Following.of_some`."""
-        own = self.u[rows], self.welded.piece[rows], self.to_group[rows], self.shares[rows]
-        return self.following.of_some(*own)
