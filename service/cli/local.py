@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import cached_property, partial
 from pathlib import Path
@@ -16,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from service import pipeline
 from service.cli.meshes import Mesh
-from service.cli.problem import Problem
+from service.cli.problem import told
 from service.cli.shapes import Count, Made, Options
 from service.constraints import parse_constraints
 from service.edited import Edited
@@ -25,7 +24,7 @@ from service.encode.catalog import Catalog
 from service.encode.installed import Installed
 from service.encode.model import SHIPPED, load_models
 from service.encode.versions import AT, explain_unknown
-from service.errors import NotFound, ShapeError
+from service.errors import NotFound
 from service.mesh.frame import AUTO
 from service.requests import EditOptions, InferOptions, SliderOptions, TransferOptions, Upload
 from service.settings import Settings
@@ -198,12 +197,3 @@ def upload(mesh: Mesh) -> Upload:
 def _made(edited: Edited, ids: Options) -> Made:
     mesh_id = Upload(edited.data).mesh_id
     return Made(edited.data, edited.format, {"mesh_id": mesh_id, **ids, **edited.report})
-
-
-@contextmanager
-def told() -> Iterator[None]:
-    """Turn the pipeline's errors into problems."""
-    try:
-        yield
-    except ShapeError as error:
-        raise Problem(error.code, error.detail, error.suggestion, error.members) from error

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from types import MappingProxyType
 from typing import Any
+
+from service.errors import ShapeError
 
 FAILED, USAGE, UNREACHABLE, INTERRUPTED, CLOSED = 1, 2, 3, 130, 141
 """Exit codes: a file couldn't be served; the command line makes no sense; no service answers;
@@ -43,6 +46,15 @@ class Problem(Exception):
         """The same as JSON; ``conflicts`` and their like as the service has them."""
         own = {"code": self.code, "detail": self.detail, "suggestion": self.suggestion}
         return {**own, **self.members}
+
+
+@contextmanager
+def told() -> Iterator[None]:
+    """Turn the service's own errors into problems."""
+    try:
+        yield
+    except ShapeError as error:
+        raise Problem(error.code, error.detail, error.suggestion, error.members) from error
 
 
 def reason(error: OSError) -> str:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 from pydantic import BaseModel
 
+from service.cli.clientfaults import told
 from service.cli.meshes import Mesh
-from service.cli.problem import UNREACHABLE, Problem
 from service.cli.shapes import Count, Made, Options
 from service.client import Mesh as Sent
 from service.client import ShapeClient
-from service.client.errors import AnswerMalformed, MeshUnknown, ProblemError, ServiceError, TimedOut
+from service.client.errors import MeshUnknown
 
 Tell = Callable[[str], None]
 
@@ -136,23 +135,3 @@ def _text(entries: Mapping[str, Any]) -> str:
 
 def _format(filename: str) -> str:
     return filename.rpartition(".")[2].lower()
-
-
-@contextmanager
-def told() -> Iterator[None]:
-    """Turn the client's errors into problems."""
-    try:
-        yield
-    except ProblemError as error:
-        trace = {"trace_id": error.trace_id} if error.trace_id else {}
-        members = {**error.members, **trace}
-        raise Problem(error.code, error.detail, error.suggestion, members) from error
-    except ServiceError as error:
-        match error:
-            case AnswerMalformed():
-                code, suggestion = "answer_malformed", "Check that --url is the service's own."
-            case TimedOut():
-                code, suggestion = "timed_out", "Try again, or ask for less at once."
-            case _:
-                code, suggestion = "unreachable", "Check --url, and that the service runs."
-        raise Problem(code, f"{error}.", suggestion, exit_code=UNREACHABLE) from error

@@ -13,14 +13,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from service.augment.sources import find_files
+from service.augment.plan import DIGITS
+from service.augment.sources import find_files, find_tasks
+from service.cli import problem
+from service.cli.clientfaults import told
 from service.cli.meshes import read
 from service.cli.neighbours import members
 from service.cli.problem import UNREACHABLE, Problem
 from service.cli.shapes import Count
 from service.client import Mesh, ShapeClient
 from service.client.models import Job
-from service.errors import ShapeError
 
 RECORD = "asked.json"
 """In each mesh's folder: what its variants were made with."""
@@ -58,14 +60,10 @@ class Batch:
             Problem: for a folder without meshes, and when the service can't be reached.
         """
         start = time.monotonic()
-        try:
+        with problem.told():
             files = find_files(directory, self.out)
-        except ShapeError as error:
-            raise Problem(error.code, error.detail, error.suggestion) from error
-        first: dict[str, Path] = {}
-        for file in files:
-            first.setdefault(hashlib.sha256(file.read_bytes()).hexdigest()[:16], file)
-        tasks = {self.out / f"{file.stem}-{digest}": file for digest, file in first.items()}
+            found = find_tasks(directory, files, "1/1", lambda: None)
+        tasks = {self.out / f"{one.path.stem}-{one.digest[:DIGITS]}": one.path for one in found}
         left = {folder: file for folder, file in tasks.items() if force or not self._kept(folder)}
         kept, rows, failures = len(tasks) - len(left), [], []
         for done, (file, made) in enumerate(_each(workers, self._make, left), start=kept + 1):
@@ -90,8 +88,6 @@ class Batch:
 
     def _make(self, folder: Path, file: Path) -> list[dict[str, Any]]:
         """Rows of the variants' manifest, once all of it is there."""
-        from service.cli.remote import told
-
         mesh = read(str(file))
         # The same mesh and options make the same job, also when a run is begun again.
         told_key = json.dumps([folder.name, self.options], sort_keys=True)
@@ -140,9 +136,9 @@ def _each(
                     file = running.pop(future)
                     try:
                         yield file, future.result()
-                    except Problem as problem:
-                        if problem.exit_code == UNREACHABLE:
+                    except Problem as fault:
+                        if fault.exit_code == UNREACHABLE:
                             raise
-                        yield file, problem
+                        yield file, fault
         finally:
             pool.shutdown(wait=False, cancel_futures=True)

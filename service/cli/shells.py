@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import click
 from click.shell_completion import (
     BashComplete,
     FishComplete,
@@ -57,8 +58,6 @@ for _class in (_Bash, _Zsh):
     add_completion_class(_class)
 
 
-def script(shell: str) -> str:
-    """What the shell is to evaluate."""
-    from service.cli.main import PROGRAM, cli
-
-    return _CLASSES[shell](cli, {}, PROGRAM, VARIABLE).source()
+def script(shell: str, command: click.Command, name: str) -> str:
+    """What the shell is to evaluate, for a command that is called by a name."""
+    return _CLASSES[shell](command, {}, name, VARIABLE).source()

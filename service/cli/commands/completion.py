@@ -27,4 +27,5 @@ def completion(shell: str | None) -> None:
     chosen = shell or (own if own in SHELLS else None)
     if chosen is None:
         raise click.UsageError(f"Name a shell: {', '.join(SHELLS)}.")
-    click.echo(script(chosen))
+    root = click.get_current_context().find_root()
+    click.echo(script(chosen, root.command, root.info_name or ""))

@@ -41,7 +41,8 @@ def _remote(command: Callable[..., None]) -> Callable[..., None]:
     def run(url: str | None, api_key: str | None, as_json: bool, quiet: bool, **given: Any) -> None:
         if url is None:
             raise click.UsageError("Jobs are at a service: say --url, or set SHAPE_URL.")
-        from service.cli.remote import Remote, told
+        from service.cli.clientfaults import told
+        from service.cli.remote import Remote
 
         output = Output(as_json, quiet)
         client = Remote(url, api_key).client
