@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,13 +120,33 @@ def edit(
         return write_edited(move(found, edits, edit_options, constraints), edit_options.format)
 
 
+@contextmanager
+def editable(
+    upload: Upload,
+    models: Mapping[str, Model],
+    options: InferOptions,
+    edit_options: EditOptions,
+    known: Inferences | None = None,
+) -> Iterator[Inference]:
+    """What is known of an upload that is to be edited several times, for `move` within the block.
+
+    Raises:
+        ShapeError: as `edit`, for what is wrong with every edit.
+    """
+    require_mode(edit_options.mode)
+    with inferred(upload, models, options, known) as found:
+        require_recognised(found, options.category)
+        move(found, {}, edit_options)
+        yield found
+
+
 def move(
     found: Inference,
     edits: Mapping[str, Change],
     edit_options: EditOptions,
     constraints: Mapping[str, Interval] = NONE,
 ) -> Moved:
-    """Carry out an edit of what is known of an upload: for callers that make several of one.
+    """Carry out an edit of what is known of an upload; see `editable`.
 
     Raises:
         ShapeError: as `edit`, but for what is wrong with the upload.

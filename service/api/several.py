@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -21,8 +21,8 @@ from service.api.prefer import RESPOND_ASYNC, prefers_async
 from service.api.schemas import BINARY, Job
 from service.encode.versions import choose
 from service.errors import Overloaded, TooComplex, TooLarge
-from service.jobs.archive import MANIFEST, MEDIA_TYPE, archive
-from service.jobs.making import LABELS, making
+from service.jobs.archive import MEDIA_TYPE, archive, contents
+from service.jobs.making import Making, making
 from service.jobs.order import Order
 from service.requests import Upload
 
@@ -106,22 +106,17 @@ def _zip(order_of: OrderOf[Form], shared: Context, asked: Asked[Form]) -> Respon
 
 def _files(order: Order, asked: Asked[Form], most: int) -> list[tuple[str, bytes]]:
     """All of the archive, of so many bytes at most."""
-    files: list[tuple[str, bytes]] = []
-    lines: list[str] = []
-    size = 0
     with making(order, asked.models, asked.known) as made:
-        for index in range(order.total):
-            part = made.part(index)
-            lines.append(f"{part.line}\n")
-            if part.name is not None and part.data is not None:
-                files.append((part.name, part.data))
-                size += len(part.data)
-            if size > most:
-                raise TooLarge(
-                    "variants_too_large",
-                    f"The variants take more than {most} bytes together.",
-                    LATER,
-                )
-        labels = made.labels()
-    files.append((MANIFEST, "".join(lines).encode()))
-    return files if labels is None else [*files, (LABELS, labels)]
+        return list(contents(_parts(order, made, most), made.labels))
+
+
+def _parts(order: Order, made: Making, most: int) -> Iterator[tuple[str | None, str, bytes | None]]:
+    size = 0
+    for index in range(order.total):
+        part = made.part(index)
+        size += len(part.data or b"")
+        if size > most:
+            raise TooLarge(
+                "variants_too_large", f"The variants take more than {most} bytes together.", LATER
+            )
+        yield part.name, part.line, part.data

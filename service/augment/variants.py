@@ -19,7 +19,6 @@ from service.augment.variant import Variant
 from service.edited import write_edited
 from service.encode.basemodel import Model
 from service.errors import InvalidRequest, Overloaded, ShapeError, TooComplex
-from service.finding import inferred, require_recognised
 from service.inference import Inference
 from service.inferences import Inferences
 from service.requests import EditOptions, InferOptions, Upload
@@ -117,11 +116,7 @@ def source(
     Raises:
         ShapeError: as `pipeline.edit`.
     """
-    pipeline.require_mode(edit_options.mode)
-    with inferred(upload, models, options, known) as found:
-        require_recognised(found, options.category)
-        # Options that are wrong for every variant are told of at once.
-        pipeline.move(found, {}, edit_options)
+    with pipeline.editable(upload, models, options, edit_options, known) as found:
         yield Source(found, edit_options)
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
-MANIFEST = "manifest.jsonl"
+MANIFEST, LABELS = "manifest.jsonl", "labels.json"
 MEDIA_TYPE = "application/zip"
 
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)
@@ -42,6 +42,26 @@ class _Sink:
         self._taken += len(held)
         self._at = 0
         return held
+
+
+def contents(
+    parts: Iterable[tuple[str | None, str, bytes | None]], labels: Callable[[], bytes | None]
+) -> Iterator[tuple[str, bytes]]:
+    """The files of an archive by name: variants, `MANIFEST`, and `LABELS` where there are any.
+
+    Args:
+        parts: a variant's file name and bytes, if it has a file, and between them its line of the
+            manifest.
+        labels: asked for once all variants are there.
+    """
+    lines = []
+    for name, line, data in parts:
+        lines.append(f"{line}\n")
+        if name is not None and data is not None:
+            yield name, data
+    yield MANIFEST, "".join(lines).encode()
+    if (found := labels()) is not None:
+        yield LABELS, found
 
 
 def archive(files: Iterable[tuple[str, bytes]]) -> Iterator[bytes]:

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal
 
+from service.errors import ShapeError
+
 Status = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 STATUSES: tuple[Status, ...] = ("queued", "running", "succeeded", "failed", "cancelled")
 OPEN: tuple[Status, ...] = ("queued", "running")
+_ERRORS = ShapeError.__module__
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,26 @@ class Failure:
     detail: str
     suggestion: str
     members: dict[str, Any]
+
+    @classmethod
+    def of(cls, error: Exception) -> Failure:
+        """What is told of an error; of what nothing foresaw, nothing about the inside."""
+        if isinstance(error, ShapeError):
+            kind = next(kind for kind in type(error).__mro__ if kind.__module__ == _ERRORS)
+            own = error.code, error.detail, error.suggestion, dict(error.members)
+            return cls(kind.__name__, *own)
+        return cls(
+            "Exception",
+            "internal_error",
+            "The service failed while it worked on this job.",
+            "Try again; if it happens again, report it with the trace_id.",
+            {},
+        )
+
+    def told(self) -> dict[str, Any]:
+        """What a row of the manifest says of it."""
+        own = {"code": self.code, "detail": self.detail, "suggestion": self.suggestion}
+        return {**own, **self.members}
 
     def text(self) -> str:
         """The same as JSON."""

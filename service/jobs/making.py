@@ -15,13 +15,12 @@ from service.edited import write_edited
 from service.edits import changes
 from service.encode.basemodel import Model
 from service.errors import Overloaded, ShapeError, TooComplex
-from service.finding import inferred, require_recognised
 from service.inference import Inference
 from service.inferences import Inferences
+from service.jobs.job import Failure
 from service.jobs.order import Order
 
 FOLDER = "variants"
-LABELS = "labels.json"
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class Making(Protocol):
         """
 
     def labels(self) -> bytes | None:
-        """`LABELS` of the archive; None where the order has none."""
+        """The archive's labels; None where the order has none."""
 
 
 @contextmanager
@@ -67,31 +66,22 @@ def making(
     Raises:
         ShapeError: when none can be made.
     """
+    given = order.upload, models, order.options, order.edit_options, known
     if order.kind == "augment":
         order.draw.require_sound()
-        given = order.upload, models, order.options, order.edit_options, known
         with source(*given) as made:
             yield _Drawn(order, made)
         return
-    pipeline.require_mode(order.edit_options.mode)
-    with inferred(order.upload, models, order.options, known) as found:
-        require_recognised(found, order.options.category)
-        # Options that are wrong for every variant are told of at once.
-        pipeline.move(found, {}, order.edit_options)
+    with pipeline.editable(*given) as found:
         yield _Edits(order, found)
 
 
-def failed(order: Order, index: int, problem: Mapping[str, Any]) -> Part:
+def failed(order: Order, index: int, error: Exception) -> Part:
     """A variant that can't be made."""
     edits = order.edits[index] if order.kind == "edit" else {}
+    problem = Failure.of(error).told()
     row = {"index": index, "status": "failed", "file": None, "edits": edits, "problem": problem}
     return Part(None, None, row)
-
-
-def told(error: ShapeError) -> dict[str, Any]:
-    """What a row says of an error."""
-    own = {"code": error.code, "detail": error.detail, "suggestion": error.suggestion}
-    return {**own, **error.members}
 
 
 @dataclass(frozen=True)
@@ -107,7 +97,7 @@ class _Edits:
         except (Overloaded, TooComplex):
             raise
         except ShapeError as error:
-            return failed(self.order, index, told(error))
+            return failed(self.order, index, error)
         name = _name(index, edited.format)
         row = {
             "index": index,
@@ -134,7 +124,7 @@ class _Drawn:
         variant = self.made.variant(self.order.draw, index)
         row = variant.row()
         if variant.problem is not None:
-            return Part(None, None, {**row, "problem": told(variant.problem)})
+            return Part(None, None, {**row, "problem": Failure.of(variant.problem).told()})
         assert variant.edited is not None
         name = _name(index, variant.edited.format)
         return Part(name, variant.edited.data, {**row, "file": name})

@@ -17,7 +17,7 @@ from service.encode.basemodel import Model
 from service.errors import Overloaded, ShapeError, TooComplex
 from service.inferences import Inferences
 from service.jobs.job import Failure, Job
-from service.jobs.making import Making, Part, failed, making, told
+from service.jobs.making import Making, Part, failed, making
 from service.jobs.order import Order
 from service.jobs.store import JobStore, LeaseLost
 from service.mesh import limits
@@ -163,7 +163,7 @@ class Runner:
         """Make what is left of its variants; why it can't be done, if so."""
         order = Order.read(job.order, upload)
         if job.attempts > ATTEMPTS:
-            return failure_of(_interrupted(job))
+            return Failure.of(_interrupted(job))
         try:
             makers = order.makers(models)
             begin = job.done
@@ -175,14 +175,14 @@ class Runner:
         except Overloaded as error:
             if error.code == "jobs_unavailable" or job.attempts < ATTEMPTS:
                 raise
-            return failure_of(error)
+            return Failure.of(error)
         except ShapeError as error:
-            return failure_of(error)
+            return Failure.of(error)
         except LeaseLost:
             raise
         except Exception as error:
             logger.exception("job %s can't be carried out", job.id)
-            return failure_of(error)
+            return Failure.of(error)
         return None
 
     def _make(
@@ -213,12 +213,12 @@ class Runner:
                 return self._limited(abandoned, lambda: made.part(index))
             except Overloaded as error:
                 if attempt == ATTEMPTS:
-                    return failed(order, index, told(error))
+                    return failed(order, index, error)
             except TooComplex as error:
-                return failed(order, index, told(error))
+                return failed(order, index, error)
             except Exception as error:
                 logger.exception("variant %d can't be made", index)
-                return failed(order, index, told_of(failure_of(error)))
+                return failed(order, index, error)
         raise AssertionError
 
     def _limited(self, abandoned: Event, work: Callable[[], T]) -> T:
@@ -249,30 +249,6 @@ class Runner:
                 return
             except ShapeError:
                 continue  # complained of by the store
-
-
-def failure_of(error: Exception) -> Failure:
-    """What is told of it; of what nothing foresaw, nothing about the inside."""
-    if isinstance(error, ShapeError):
-        name = next(kind.__name__ for kind in type(error).__mro__ if kind.__module__ in _ERRORS)
-        own = error.code, error.detail, error.suggestion, dict(error.members)
-        return Failure(name, *own)
-    return Failure(
-        "Exception",
-        "internal_error",
-        "The service failed while it worked on this job.",
-        "Try again; if it happens again, report it with the trace_id.",
-        {},
-    )
-
-
-_ERRORS = frozenset({ShapeError.__module__})
-
-
-def told_of(failure: Failure) -> dict[str, object]:
-    """What a row of the manifest says of it."""
-    own = {"code": failure.code, "detail": failure.detail, "suggestion": failure.suggestion}
-    return {**own, **failure.members}
 
 
 def _interrupted(job: Job) -> Overloaded:

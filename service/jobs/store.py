@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from service.errors import Conflict, Crowded, NotFound, Overloaded, TooLarge
-from service.jobs.archive import MANIFEST
+from service.jobs.archive import contents
 from service.jobs.database import Database
 from service.jobs.job import Failure, Job, Status, new_id
-from service.jobs.making import LABELS, Part
+from service.jobs.making import Part
 from service.jobs.order import Order
 from service.requests import Upload
 from service.store.holding import Holding
@@ -153,25 +153,12 @@ class JobStore:
         Raises:
             Gone: the job is removed meanwhile.
         """
-        lines: list[str] = []
-        for position in range(total):
-            with self._database.transaction(writes=False) as db:
-                part = db.execute(
-                    "SELECT name, line, data FROM parts WHERE job = ? AND position = ?",
-                    (job_id, position),
-                ).fetchone()
-            if part is None:
-                raise Gone(job_id)
-            lines.append(part["line"])
-            if part["name"] is not None:
-                yield part["name"], part["data"]
-        yield MANIFEST, "".join(f"{line}\n" for line in lines).encode()
-        with self._database.transaction(writes=False) as db:
-            labels = db.execute(
-                "SELECT data FROM parts WHERE job = ? AND position = ?", (job_id, LABELS_AT)
-            ).fetchone()
-        if labels is not None:
-            yield LABELS, labels["data"]
+
+        def labels() -> bytes | None:
+            part = self._part(job_id, LABELS_AT)
+            return None if part is None else part["data"]
+
+        return contents(self._parts(job_id, total), labels)
 
     def end(self, job_id: str, owner: str) -> Job | None:
         """Cancel a job, or remove it when it is finished.
@@ -316,6 +303,20 @@ class JobStore:
         except Overloaded:
             pass  # complained of; jobs are refused until it is mended
 
+    def _parts(self, job_id: str, total: int) -> Iterator[tuple[str | None, str, bytes | None]]:
+        for position in range(total):
+            part = self._part(job_id, position)
+            if part is None:
+                raise Gone(job_id)
+            yield part["name"], part["line"], part["data"]
+
+    def _part(self, job_id: str, position: int) -> Any:
+        with self._database.transaction(writes=False) as db:
+            return db.execute(
+                "SELECT name, line, data FROM parts WHERE job = ? AND position = ?",
+                (job_id, position),
+            ).fetchone()
+
     def _save(
         self, job_id: str, lease: str, at: int, name: str | None, line: str, data: bytes | None
     ) -> None:
@@ -365,11 +366,10 @@ class JobStore:
         limits = self.bounds.open // share or 1, self.bounds.bytes // share
         if room > limits[1]:
             raise _too_large(limits[1])
-        for who, most_open, most_bytes in (
-            ("You have", *limits),
-            ("There are", self.bounds.open, self.bounds.bytes),
+        for who, own, most_open, most_bytes in (
+            ("You have", "owner = ?", *limits),
+            ("There are", "? IS NOT NULL", self.bounds.open, self.bounds.bytes),
         ):
-            own = "owner = ?" if who == "You have" else "? IS NOT NULL"
             jobs, taken = db.execute(
                 f"SELECT COALESCE(SUM(status NOT IN {_FINISHED}), 0), COALESCE(SUM(room), 0)"
                 f" FROM jobs WHERE {own}",
