@@ -9,39 +9,29 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from model_export.benchmark.accuracy import diagonal
-from service.deform.normals import vertex_normals
+from service.deform.flips import counted
+from service.deform.normals import face_crosses, vertex_normals
 
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
-NEGLIGIBLE = 1e-4
-"""Faces smaller than this share of the mean area have no direction worth counting."""
 SLIVER = 1e-3
 """A face that loses all but this share of its area has degenerated."""
 TOUCH = 5e-3
 """Vertices of two pieces that are nearer than this share of the diagonal touch."""
 
 
-def normals(vertices: Array, faces: Faces) -> Array:
-    """``[F, 3]`` of faces, twice their areas long."""
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    crossed: Array = np.cross(b - a, c - a)
-    return crossed
-
-
 def flips(y: Array, reference: Array, faces: Faces) -> int:
     """Faces that face away from where they do in the reference: the true edit, or the input."""
-    due, found = normals(reference, faces), normals(y, faces)
-    area = np.linalg.norm(due, axis=1)
-    counted = area > NEGLIGIBLE * area.mean()
-    return int(((np.einsum("fc,fc->f", due, found) < 0.0) & counted).sum())
+    due, found = face_crosses(reference, faces), face_crosses(y, faces)
+    against = np.einsum("fc,fc->f", due, found) < 0.0
+    return int((against & counted(np.einsum("fc,fc->f", due, due))).sum())
 
 
 def degenerate(y: Array, reference: Array, faces: Faces) -> int:
     """Faces that have an area in the reference and hardly any in ``y``."""
-    due, found = (np.linalg.norm(normals(v, faces), axis=1) for v in (reference, y))
-    counted = due > NEGLIGIBLE * due.mean()
-    return int(((found < SLIVER * due) & counted).sum())
+    due, found = (np.linalg.norm(face_crosses(v, faces), axis=1) for v in (reference, y))
+    return int(((found < SLIVER * due) & counted(due**2)).sum())
 
 
 def pieces(faces: Faces, count: int) -> NDArray[np.int64]:
