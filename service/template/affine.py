@@ -176,15 +176,13 @@ class AffineTemplate:
     def following(self, f: Array) -> Array:
         """``[d, d]`` changes of all parameters for changes of those named, from ``f [d]`` on.
 
-        The identity, but that a nuisance parameter which follows another moves with it in
-        proportion, by no more than the other does: a high wing stays on top of a taller fuselage,
-        a T-tail on the tip of a longer fin.
+        The identity, but that a nuisance parameter which follows others goes along with them: a
+        high wing stays on top of a taller fuselage, a T-tail on the tip of a longer fin.
         """
         matrix = np.eye(len(f))
         for index, parameter in enumerate(self.parameters):
             if parameter.follows is not None:
-                leader = self.names.index(parameter.follows)
-                matrix[index, leader] = np.clip(f[index] / max(f[leader], TINY), -1.0, 1.0)
+                matrix[index] += parameter.follows.row(f)
         return matrix
 
     def broken_relations(self, f: Array) -> list[str]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from service.template.affine import AffineTemplate
 from service.template.expressions import ExpressionError, parse_affine, parse_rows
+from service.template.guide import Guide, read_guide
 from service.template.parameters import Derived, Parameter
 from service.template.parts import Part, PartError, read_parts
 
@@ -51,9 +52,9 @@ def template_path(source: str | Path) -> Path:
 def compile_template(spec: Mapping[str, Any]) -> AffineTemplate:
     """Compile a template from the parsed YAML; see `chair.yaml` for the entries."""
     try:
-        parameters = tuple(_parameter(name, entry) for name, entry in spec["parameters"].items())
-        _require_leaders(parameters)
-        names = [parameter.name for parameter in parameters]
+        entries: Mapping[str, Any] = spec["parameters"]
+        names = [str(name) for name in entries]
+        parameters = tuple(_parameter(name, entry, entries) for name, entry in entries.items())
         parts = [
             part for name, entry in spec["parts"].items() for part in read_parts(name, entry, names)
         ]
@@ -121,7 +122,9 @@ def _assemble(parts: Sequence[Part]) -> dict[str, Any]:
     }
 
 
-def _parameter(name: str, entry: Mapping[str, Any]) -> Parameter:
+def _parameter(
+    name: str, entry: Mapping[str, Any], entries: Mapping[str, Mapping[str, Any]]
+) -> Parameter:
     low, high = (float(end) for end in entry["range"])
     nuisance = _flag(entry.get("nuisance", False))
     if not low < high:
@@ -140,21 +143,23 @@ def _parameter(name: str, entry: Mapping[str, Any]) -> Parameter:
         high=high,
         typical=_interval(entry.get("typical", [low, high])),
         nuisance=nuisance,
-        follows=entry.get("follows"),
+        follows=_follows(name, entry, entries),
     )
 
 
-def _require_leaders(parameters: Sequence[Parameter]) -> None:
+def _follows(
+    name: str, entry: Mapping[str, Any], entries: Mapping[str, Mapping[str, Any]]
+) -> Guide | None:
     """Only nuisance parameters follow, and only public ones lead."""
-    public = [parameter.name for parameter in parameters if not parameter.nuisance]
-    for parameter in parameters:
-        if parameter.follows is None:
-            continue
-        if not parameter.nuisance or parameter.follows not in public:
-            raise TemplateError(
-                f"parameter {parameter.name!r} follows {parameter.follows!r}: a nuisance "
-                "parameter may follow a public one"
-            )
+    if "follows" not in entry:
+        return None
+    public = [not other.get("nuisance", False) for other in entries.values()]
+    try:
+        if not entry.get("nuisance", False):
+            raise ExpressionError("only nuisance parameters do")
+        return read_guide(name, entry["follows"], list(entries), public)
+    except ExpressionError as error:
+        raise TemplateError(f"parameter {name!r} follows {entry['follows']!r}: {error}") from error
 
 
 def _flag(value: object) -> bool:

@@ -8,6 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from service.template.guide import Guide
+
 Axis = Literal["x", "y", "z"]
 
 
@@ -23,8 +25,7 @@ class Parameter:
         low, high: the range that synthetic shapes are drawn from.
         typical: where most real shapes lie; what a slider spans.
         nuisance: inferred like the others so that the template fits, but not offered to users.
-        follows: the parameter whose edits carry it along, for a nuisance one (see
-            `AffineTemplate.following`).
+        follows: what carries it along when others are edited, for a nuisance one.
     """
 
     name: str
@@ -35,7 +36,7 @@ class Parameter:
     high: float
     typical: tuple[float, float]
     nuisance: bool = False
-    follows: str | None = None
+    follows: Guide | None = None
 
     @property
     def signed(self) -> bool:

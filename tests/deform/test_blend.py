@@ -247,8 +247,9 @@ def test_a_t_tail_rides_on_the_fin_and_the_rest_stays():
         plane_change("vertical_stabilizer_length", 1.25)
     )
     tail = of_part("left_horizontal_stabilizer") | of_part("right_horizontal_stabilizer")
-    raised = 0.25 * VALUES["horizontal_stabilizer_height"]
+    raised = 0.25 * (VALUES["horizontal_stabilizer_height"] - 0.2 * VALUES["fuselage_height"])
     np.testing.assert_allclose(moved[tail, 1], raised, atol=1e-6)
+    np.testing.assert_allclose(moved[tail, 2], -0.4 * raised, atol=1e-6)
     still = of_part("fuselage") | of_part("left_wing") | of_part("right_wing")
     assert np.abs(moved[still]).max() < 1e-6
 

@@ -118,16 +118,31 @@ def test_what_follows_keeps_its_place_beside_what_leads(
     tip = own(airplane, taller, "vertical_stabilizer")[:, 1].max()
     plane = own(airplane, taller, "left_horizontal_stabilizer")[:, 1]
     assert plane.mean() == pytest.approx(tip), "a T-tail stays on top of the fin"
+    swept = own(airplane, taller, "left_horizontal_stabilizer")[:, 2].mean()
+    gone = swept - own(airplane, tee, "left_horizontal_stabilizer")[:, 2].mean()
+    assert gone == pytest.approx(-0.4 * 0.5 * tee[fin]), "and goes back with it"
     low = f.copy()
-    low[height] = 0.0
-    assert after(low, fin, 1.5)[height] == 0.0
-    slim = f.copy()
-    slim[[names.index("tail_height"), names.index("tail_rise")]] = -0.03, 0.01
-    bigger = after(slim, body, 1.5)
-    moved = [names[i] for i in np.flatnonzero(bigger != slim)]
-    assert set(moved) == {"fuselage_height", "wing_height", "tail_height", "tail_rise"}
-    for name in moved:
-        assert bigger[names.index(name)] == pytest.approx(1.5 * slim[names.index(name)])
+    low[height] = -0.02
+    assert after(low, fin, 1.5)[height] == low[height], "a low one does not sink as the fin grows"
+
+
+def test_what_is_on_the_fuselage_keeps_its_place_on_it(
+    airplane: AffineTemplate, f: np.ndarray
+) -> None:
+    names = airplane.names
+    body, f = names.index("fuselage_height"), f.copy()
+    f[[names.index("tail_height"), names.index("tail_rise")]] = -0.03, 0.01
+    f[names.index("horizontal_stabilizer_height")] = -0.02
+    bigger = f + airplane.following(f) @ (0.5 * f[body] * np.eye(len(f))[body])
+    moved = [names[i] for i in np.flatnonzero(bigger != f)]
+    proportional = {"fuselage_height", "wing_height", "tail_height", "tail_rise"}
+    assert set(moved) == proportional | {"horizontal_stabilizer_height"}
+    for name in proportional:
+        assert bigger[names.index(name)] == pytest.approx(1.5 * f[names.index(name)])
+    before, after = (
+        own(airplane, v, "left_horizontal_stabilizer")[:, 1].mean() for v in (f, bigger)
+    )
+    assert after == pytest.approx(1.5 * before)
 
 
 def test_the_fuselage_can_taper_to_a_boom_or_end_in_a_nozzle(
