@@ -90,7 +90,7 @@ def require_recognised(found: Inference, category: str) -> None:
     if category == AUTO and not found.in_distribution:
         raise InvalidRequest(
             "not_recognised",
-            f"the mesh is most like a {found.model.name}, but does not look like one "
+            f"the mesh is most like the category {found.model.name}, but does not look like one "
             f"(score {found.best.score:.2f})",
             f"Send category={found.model.name} to edit it as one all the same.",
         )

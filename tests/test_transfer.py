@@ -298,7 +298,7 @@ def test_what_is_not_recognised_is_not_transferred(
     with pytest.raises(InvalidRequest) as error:
         transfer(ball(), ball(), only, ANY, ANY, TransferOptions(), known)
     assert error.value.code == "not_recognised"
-    told = f"the mesh is most like a {strange.model.name}, but"
+    told = f"the mesh is most like the category {strange.model.name}, but"
     assert error.value.detail.startswith(f"source: {told}")
     named = replace(ANY, category=strange.model.name)
     with pytest.raises(InvalidRequest) as error:

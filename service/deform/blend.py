@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from service.deform.seams import Seams, flush_seams
 from service.deform.shares import Blocks, all_shares
 from service.deform.spine import straighten
 from service.deform.spinefit import Spine
+from service.deform.sweep import swept
 from service.deform.weld import weld
 from service.template.affine import AffineTemplate
 
@@ -58,6 +59,7 @@ def bind(
     x = welded.vertices - np.asarray(t, np.float64)
     fit = _fit(template, f)
     u = fit.boxes.local(x)
+    fit = replace(fit, template=swept(fit.template, f, fit.boxes, u, welded.faces))
     hubs = hub_parts(fit.template)
     spines = straighten(u, welded.faces, fit.boxes, fit.groups, hubs)
     distances = fit.boxes.distances(u)

@@ -128,18 +128,26 @@ def lofts(
         frames, tapers: ``[P, 3, 4]`` and ``[P, 3, 3]`` of the parts as they are bound, which begin
         starts: ``[P]`` so far along the template's own.
     """
-    # Thin parts are seen more clearly in the middle of the ranges, swollen ones as they are.
-    middle = (template.low + template.high) / 2
-    shapes = [(template.maps(g), template.decode(g)) for g in (middle, f)]
     found = {}
     for part, run in enumerate(template.run.tolist()):
-        of_part = template.part == part
-        plain, own = (_unit(maps, part, vertices[of_part]) for maps, vertices in shapes)
-        outline = None if _is_box(plain, run) else _outline(own, run, starts[part])
+        outline = outline_of(template, f, part, starts[part])
         taper = np.diagonal(tapers[part])
         if outline is not None or taper.any():
             found[part] = Loft(frames[part], taper, run, outline)
     return found
+
+
+def outline_of(
+    template: AffineTemplate, f: Array, part: int, start: float = -0.5
+) -> Outline | None:
+    """The sections of a part from ``start`` along its run on; None for a box."""
+    # Thin parts are seen more clearly in the middle of the ranges, swollen ones as they are.
+    own, run, middle = template.part == part, template.run[part], (template.low + template.high) / 2
+    plain, swollen = (
+        _unit(template.maps(g), part, template.base[own] + template.jacobian[own] @ g)
+        for g in (middle, f)
+    )
+    return None if _is_box(plain, run) else _outline(swollen, run, start)
 
 
 def _unit(maps: Frames, part: int, x: Array) -> Array:

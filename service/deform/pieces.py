@@ -27,6 +27,8 @@ Mask = NDArray[np.bool_]
 STRETCHED = 0.7
 # The same for a rod along its own axis, such as a spindle, which is held at both ends.
 ROD = (0.1, 0.2)
+# Share of the part's length under which a piece of its skin goes with what hangs there.
+SMALL = 0.06
 # Beyond any unit coordinate.
 FAR = 1e9
 # With more pieces than this, as in a broken scan, each is carried by itself.
@@ -94,12 +96,16 @@ def vote(
     # Nothing holds the tip of a propeller's blade, off the wing, as a spindle's ends are held.
     rods &= (_by_part(cost, groups) < 2 * TOUCH)[:, :, None] | ~boxes.rounded[:, None]
     member = _by_part(shares, groups) == 1.0
-    low, high = _assemble(low, high, member[:, :, None] & ~rods, touching, thin)
+    hanging = member[:, :, None] & ~rods & (high - low < CARRIED)
+    small = hanging & (high - low < SMALL) & hubs[:, None]
+    joined = _joined(hanging & ~skin[:, :, None], small, touching)
+    skin = skin[:, :, None] & ~joined
+    low, high = _assemble(low, high, hanging & ~skin, touching, thin)
     keep = np.where(rods, _stretch(high - low, *ROD), _stretch(high - low, CARRIED, STRETCHED))
     # Where a piece makes up the part, it is as thick as the part; else it is carried at the spot
     # nearest the part's middle where it touches.
     keep = np.where(thin, made[:, :, None], keep)
-    keep[skin | np.isnan(shares[:, :1])] = 1.0
+    keep[skin | np.isnan(shares[:, :1, None])] = 1.0
     contact = np.clip(np.clip(0.0, touch_low, touch_high), -0.5, 0.5)
     anchor = np.where(thin & ~made[:, :, None], contact, _anchor(low, high))
     return Votes(shares, keep.astype(np.float32), anchor.astype(np.float32))
@@ -116,6 +122,13 @@ def _skin(cost: Array32, groups: list[Group], boxes: Boxes) -> Mask:
     """``[pieces, P]`` pieces of a round or tapered part's skin, such as a flap: they stretch with
     it, lest they tear off the rest."""
     return np.asarray((_by_part(cost, groups) < TOUCH) & boxes.rounded)
+
+
+def _joined(hanging: Mask, small: Mask, touching: Mask) -> Mask:
+    """``[pieces, P, 3]`` small pieces that touch some that hang from a part: a strut in the belly
+    is its wheel's."""
+    reached = touching.astype(np.float32) @ hanging.reshape(len(hanging), -1) > 0.0
+    return small & reached.reshape(hanging.shape)
 
 
 def _by_part(values: Array32, groups: list[Group]) -> Array32:
@@ -167,9 +180,7 @@ def _assemble(
     """
     low, high = low.copy(), high.copy()
     for part, axis in np.argwhere(~thin):
-        carried = np.flatnonzero(
-            member[:, part, axis] & (high[:, part, axis] - low[:, part, axis] < CARRIED)
-        )
+        carried = np.flatnonzero(member[:, part, axis])
         if len(carried) < 2:
             continue
         links = csr_array(touching[np.ix_(carried, carried)])
