@@ -16,13 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from service.deform.assemblies import touching_pieces
 from service.deform.binding import Binding, inverse_frames
 from service.deform.clamp import saturate, stretch_limits
 from service.deform.compilation import Compiler, Field, Moves
 from service.deform.discord import discord
 from service.deform.groups import Group, hub_parts, mirror_groups
 from service.deform.loft import lofts
-from service.deform.pieces import Votes, touching_pieces, vote
+from service.deform.pieces import Votes, vote
 from service.deform.proximity import BAND, Boxes, blocks, group_distance, nearness
 from service.deform.rims import Rim, find_rims
 from service.deform.roots import rooted

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
+from service.deform.assemblies import Assemblies, hung, joined
 from service.deform.choice import CARRIED, TOUCH, Cases, choose, mean_distance, realised
 from service.deform.groups import Group
 from service.deform.proximity import Boxes
@@ -27,12 +26,8 @@ Mask = NDArray[np.bool_]
 STRETCHED = 0.7
 # The same for a rod along its own axis, such as a spindle, which is held at both ends.
 ROD = (0.1, 0.2)
-# Share of the part's length under which a piece of its skin goes with what hangs there.
-SMALL = 0.06
 # Beyond any unit coordinate.
 FAR = 1e9
-# With more pieces than this, as in a broken scan, each is carried by itself.
-MANY = 1500
 
 
 @dataclass(frozen=True)
@@ -90,23 +85,24 @@ def vote(
     cost = mean_distance(to_group, starts)
     free = mean_distance(to_group.min(axis=0, keepdims=True), starts)
     cases = Cases(made, nearest, cost, free, high - low, touching)
-    shares = choose(cases, groups, boxes, hubs)
-    skin = _skin(cost, groups, boxes)
+    shares = hung(choose(cases, groups, boxes, hubs), nearest.min(axis=1), high - low, touching)
     rods = _elongated((high - low) * boxes.sizes.astype(np.float32))
     # Nothing holds the tip of a propeller's blade, off the wing, as a spindle's ends are held.
     rods &= (_by_part(cost, groups) < 2 * TOUCH)[:, :, None] | ~boxes.rounded[:, None]
     member = _by_part(shares, groups) == 1.0
     hanging = member[:, :, None] & ~rods & (high - low < CARRIED)
-    small = hanging & (high - low < SMALL) & hubs[:, None]
-    joined = _joined(hanging & ~skin[:, :, None], small, touching)
-    skin = skin[:, :, None] & ~joined
-    low, high = _assemble(low, high, hanging & ~skin, touching, thin)
+    skin = _skin(cost, groups, boxes)
+    skin &= ~(hubs & joined(hanging & ~skin[:, :, None], high - low, touching, thin))
+    assembled = Assemblies(hanging & ~skin[:, :, None] & ~thin, touching)
+    low, high = assembled.extents(low, high)
     keep = np.where(rods, _stretch(high - low, *ROD), _stretch(high - low, CARRIED, STRETCHED))
     # Where a piece makes up the part, it is as thick as the part; else it is carried at the spot
     # nearest the part's middle where it touches.
     keep = np.where(thin, made[:, :, None], keep)
-    keep[skin | np.isnan(shares[:, :1, None])] = 1.0
-    contact = np.clip(np.clip(0.0, touch_low, touch_high), -0.5, 0.5)
+    keep[skin | np.isnan(shares[:, :1])] = 1.0
+    carried = member & ~made & ~skin & boxes.rounded
+    together = Assemblies(carried[:, :, None] & thin, touching)
+    contact = np.clip(together.contacts(touch_low, touch_high, nearest), -0.5, 0.5)
     anchor = np.where(thin & ~made[:, :, None], contact, _anchor(low, high))
     return Votes(shares, keep.astype(np.float32), anchor.astype(np.float32))
 
@@ -122,13 +118,6 @@ def _skin(cost: Array32, groups: list[Group], boxes: Boxes) -> Mask:
     """``[pieces, P]`` pieces of a round or tapered part's skin, such as a flap: they stretch with
     it, lest they tear off the rest."""
     return np.asarray((_by_part(cost, groups) < TOUCH) & boxes.rounded)
-
-
-def _joined(hanging: Mask, small: Mask, touching: Mask) -> Mask:
-    """``[pieces, P, 3]`` small pieces that touch some that hang from a part: a strut in the belly
-    is its wheel's."""
-    reached = touching.astype(np.float32) @ hanging.reshape(len(hanging), -1) > 0.0
-    return small & reached.reshape(hanging.shape)
 
 
 def _by_part(values: Array32, groups: list[Group]) -> Array32:
@@ -168,33 +157,3 @@ def _elongated(extent: Array32) -> Mask:
     longest = np.argsort(extent, axis=2)[:, :, 2:]
     others = np.sort(extent, axis=2)[:, :, 1:2]
     return (np.arange(3) == longest) & (extent >= 2.0 * others)
-
-
-def _assemble(
-    low: Array32, high: Array32, member: Mask, touching: Mask, thin: Mask
-) -> tuple[Array32, Array32]:
-    """Extents of assemblies in place of those of their pieces.
-
-    Pieces that are carried along an axis and touch, such as the castors and the spokes of a
-    swivel base, are carried together; ``member [pieces, P, 3]`` says which may be.
-    """
-    low, high = low.copy(), high.copy()
-    for part, axis in np.argwhere(~thin):
-        carried = np.flatnonzero(member[:, part, axis])
-        if len(carried) < 2:
-            continue
-        links = csr_array(touching[np.ix_(carried, carried)])
-        _, label = connected_components(links, directed=False)
-        bottom, top = np.full(label.max() + 1, np.inf), np.full(label.max() + 1, -np.inf)
-        np.minimum.at(bottom, label, low[carried, part, axis])
-        np.maximum.at(top, label, high[carried, part, axis])
-        low[carried, part, axis], high[carried, part, axis] = bottom[label], top[label]
-    return low, high
-
-
-def touching_pieces(low: NDArray[np.float64], high: NDArray[np.float64]) -> Mask:
-    """``[pieces, pieces]`` whether the bounding boxes ``low, high [pieces, 3]`` touch."""
-    if len(low) > MANY:
-        return np.eye(len(low), dtype=bool)
-    apart = np.maximum(low[:, None] - high[None], low[None] - high[:, None])
-    return np.asarray((apart < TOUCH / 2).all(axis=2))

@@ -6,10 +6,11 @@ import numpy as np
 from boxes import ORIGIN
 from numpy.typing import NDArray
 
+from service.deform.assemblies import touching_pieces
 from service.deform.binding import inverse_frames
 from service.deform.groups import hub_parts, mirror_groups
 from service.deform.loft import lofts
-from service.deform.pieces import Votes, touching_pieces, vote
+from service.deform.pieces import Votes, vote
 from service.deform.proximity import Boxes, group_distance
 from service.deform.roots import rooted
 from service.deform.weld import Welded, weld

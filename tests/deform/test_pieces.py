@@ -5,7 +5,7 @@ from ballots import votes_of
 from boxes import PARAMETERS, block, chair, joined, template_mesh
 from planes import on_wing, plane, plane_values
 
-from service.deform.pieces import Votes, touching_pieces
+from service.deform.pieces import Votes
 from service.deform.weld import Welded
 
 W, D = PARAMETERS[[4, 3]]
@@ -68,12 +68,6 @@ def test_touching_pieces_are_carried_together():
     assert apart.anchor[0, 2, 1] != apart.anchor[1, 2, 1]
 
 
-def test_boxes_touch_across_a_hair_and_not_across_a_hand():
-    low = np.array([[0.0, 0, 0], [0.101, 0, 0], [0.3, 0, 0]])
-    touching = touching_pieces(low, low + 0.1)
-    assert touching.tolist() == [[True, True, False], [True, True, False], [False, False, True]]
-
-
 def test_a_flap_stretches_with_the_wing_and_an_engine_is_carried():
     flap = beside_wing(on_wing("left_wing", 0.5, 0.0, -0.4), (0.1, 0.004, 0.02))
     np.testing.assert_array_equal(flap.keep[0, 1], 1.0)
@@ -88,3 +82,46 @@ def test_a_propellers_blade_is_no_spindle():
     blade = beside_wing(on_wing("left_wing", 0.5, 0.0, 0.5) + ahead, (0.12, 0.02, 0.004))
     assert blade.shares[0].tolist() == [0, 1, 0, 0]
     assert blade.keep[0, 1, 0] == 0.0
+
+
+def hanging(*boxes: tuple[list[float], list[float]]) -> tuple[Welded, Votes]:
+    """Blocks with ends in the fuselage's half sizes from its middle, but ahead in its length."""
+    half = 0.5 * plane().maps(plane_values()).frames[0, :, :3].diagonal() * [1, 1, 2]
+    return votes_of(
+        plane(),
+        plane_values(),
+        joined(*(block(tuple(half * low), tuple(half * high)) for low, high in boxes)),
+    )
+
+
+def test_a_gears_leg_and_wheel_go_with_the_spot_where_the_leg_is_fixed():
+    leg = ([-0.1, -1.8, 0.20], [0.1, -0.9, 0.21])
+    wheel = ([-0.15, -2.3, 0.19], [0.15, -1.75, 0.23])
+    _, alone = hanging(wheel)
+    welded, result = hanging(leg, wheel)
+    upper = welded.boxes()[0][:, 1].argmax()
+    assert (result.shares[:, 0] == 1.0).all()
+    np.testing.assert_array_equal(result.keep[:, 0], 0.0)
+    np.testing.assert_array_equal(result.anchor[0, 0], result.anchor[1, 0])
+    assert result.anchor[upper, 0, 1] > alone.anchor[0, 0, 1] == -0.5
+
+
+def test_a_strut_in_the_belly_is_its_wheels_and_a_hatch_is_the_skins():
+    strut = ([-0.05, -1.25, 0.20], [0.05, -0.8, 0.21])
+    wheel = ([-0.1, -1.9, 0.19], [0.1, -1.2, 0.23])
+    _, hatch = hanging(strut)
+    np.testing.assert_array_equal(hatch.keep[0, 0], 1.0)
+    _, result = hanging(strut, wheel)
+    np.testing.assert_array_equal(result.keep[:, 0], 0.0)
+    np.testing.assert_array_equal(result.anchor[0, 0], result.anchor[1, 0])
+
+
+def test_a_wheel_goes_with_its_leg_on_the_wing():
+    foot = on_wing("left_wing", 0.12, 0.0, 0.2)
+    leg = block(tuple(foot - np.array([0.004, 0.08, 0.004])), tuple(foot + 0.004))
+    low, high = foot - np.array([0.09, 0.10, 0.01]), foot + np.array([0.0, -0.075, 0.01])
+    wheel = block(tuple(low), tuple(high))
+    _, alone = votes_of(plane(), plane_values(), wheel)
+    assert alone.shares[0, 0] == 1.0, "the fuselage is nearer"
+    _, result = votes_of(plane(), plane_values(), joined(leg, wheel))
+    assert result.shares[:, 1].tolist() == [1.0, 1.0]
