@@ -18,7 +18,7 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 # Share of the part's length under which a piece of its skin goes with what hangs there.
-SMALL = 0.06
+SMALL = 0.15
 # With more pieces than this, as in a broken scan, each is carried by itself.
 MANY = 1500
 

@@ -103,8 +103,13 @@ def vote(
     carried = member & ~made & ~skin & boxes.rounded
     together = Assemblies(carried[:, :, None] & thin, touching)
     contact = np.clip(together.contacts(touch_low, touch_high, nearest), -0.5, 0.5)
-    anchor = np.where(thin & ~made[:, :, None], contact, _anchor(low, high))
+    place = np.where((hubs & boxes.rounded)[:, None], _middle(low, high), _anchor(low, high))
+    anchor = np.where(thin & ~made[:, :, None], contact, place)
     return Votes(shares, keep.astype(np.float32), anchor.astype(np.float32))
+
+
+def _middle(low: Array32, high: Array32) -> Array32:
+    return np.clip((low + high) / 2, -0.5, 0.5)
 
 
 def _anchor(low: Array32, high: Array32) -> Array32:
