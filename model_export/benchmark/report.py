@@ -13,6 +13,7 @@ from model_export.benchmark.case import FACTORS
 from model_export.benchmark.score import BEST
 from model_export.benchmark.service_checks import Identity
 from model_export.benchmark.tables import NO_TRUTH, TRUTH, by_edit, seconds, table, worst
+from service.augment.crossings import DEEP
 
 Row = dict[str, Any]
 
@@ -26,8 +27,12 @@ nothing.  An edit is near with EA below {BEST["accuracy"]}, what should stay mov
 {BEST["locality"]}, and no face flipped; it has passed if besides less than a thousandth of the
 faces are degenerate, and no gap of {BEST["gap"]} or more has opened between pieces that touched
 (99th percentile).  A rival that answers with another mesh never passes.  Flips are counted against
-the true edit's normals, or the input's where there is no truth.  In the picture red is what lies
-1 % of the diagonal or more from where it should.
+the true edit's normals, or the input's where there is no truth.  Crossings are pairs of faces that
+run through each other by more than {DEEP} and do so neither in the input nor in the true edit; of
+pieces that run into each other already and slide, these are many.  An edit is crossed that has any
+between pieces, or within one, that did not run into each other in either.  They are looked for in a
+quarter of the edits, the same of every rival; what has passed may be crossed.  In the picture red
+is what lies 1 % of the diagonal or more from where it should.
 
 ![rivals](rivals.png)
 """

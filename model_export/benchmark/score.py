@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,8 @@ from model_export.benchmark.accuracy import (
     locality,
     surface_accuracy,
 )
-from model_export.benchmark.case import Case
+from model_export.benchmark.case import FACTORS, Case
+from model_export.benchmark.crossed import Crossed, Crossing
 from model_export.benchmark.detail import edge_ratio, edges_of, laplacian_change
 from model_export.benchmark.symmetry import asymmetry
 from model_export.benchmark.validity import contacts, degenerate, flips, gap, pieces
@@ -27,6 +29,9 @@ MADE_SAMPLES = 200_000
 """Points on a mesh made anew, which stand for it."""
 BEST = {"accuracy": 0.1, "locality": 1e-3, "flips": 0.0, "degenerate": 1.0, "gap": 1e-3}
 """An edit below all of these passes; flips must be none."""
+
+RARE = 4
+"""Crossings are looked for in one of two factors of every other parameter: a quarter of edits."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,9 @@ class Score:
         detail: change of the Laplacian coordinates, where there is no truth.
         flips, degenerate: faces in a thousand.
         gap: 99th percentile of how far what touched comes apart.
+        crossings: new pairs of faces that run through each other, per 10,000 faces; of a quarter
+            of the edits.
+        crossed: whether there are any of pieces that did not run through each other.
         asymmetry: added by the edit.
         order: whether vertices and faces are the input's, in its order.
         near: whether it is accurate, local and without flips,
@@ -57,6 +65,8 @@ class Score:
     flips: float | None = None
     degenerate: float | None = None
     gap: float | None = None
+    crossings: float | None = None
+    crossed: bool | None = None
     asymmetry: float | None = None
     order: bool = True
     near: bool = False
@@ -69,6 +79,7 @@ class Judge:
     def __init__(self, case: Case) -> None:
         self.case = case
         self.x, self.faces = case.vertices, case.faces
+        self._due: dict[tuple[str, float], Crossing] = {}
 
     @cached_property
     def _edges(self) -> NDArray[np.int64]:
@@ -77,6 +88,10 @@ class Judge:
     @cached_property
     def _touching(self) -> NDArray[np.int64]:
         return contacts(self.x, pieces(self.faces, len(self.x)))
+
+    @cached_property
+    def _crossed(self) -> Crossed:
+        return Crossed(self.x, self.faces)
 
     @cached_property
     def _asymmetry(self) -> float:
@@ -115,10 +130,15 @@ class Judge:
             "gap": gap(x, y, truth, self.faces, self._touching),
             "asymmetry": max(asymmetry(y) - self._asymmetry, 0.0),
         }
+        crossings, crossed = self._crossings(edit, y)
         if truth is None:
-            passed = _good(sound, ("flips", "degenerate", "gap"))
-            detail = laplacian_change(x, y, self.faces)
-            return Score(detail=detail, passed=passed, **sound)
+            return Score(
+                detail=laplacian_change(x, y, self.faces),
+                crossings=crossings,
+                crossed=crossed,
+                passed=_good(sound, ("flips", "degenerate", "gap")),
+                **sound,
+            )
         accuracy, tail = edit_accuracy(x, y, truth)
         close = {"accuracy": accuracy, "locality": locality(x, y, truth)}
         edge, edge_tail = edge_ratio(y, truth, self._edges)
@@ -127,11 +147,28 @@ class Judge:
             dimension=dimension_error(x, y, truth, edit.factor),
             edge=edge,
             edge_tail=edge_tail,
+            crossings=crossings,
+            crossed=crossed,
             near=_good(close | sound, ("accuracy", "locality", "flips")),
             passed=_good(close | sound, tuple(BEST)),
             **close,
             **sound,
         )
+
+    def _crossings(self, edit: Edit, y: Array) -> tuple[float | None, bool | None]:
+        # They take longer to find than all else.  Of every input other edits are looked at, the
+        # same ones of each rival.
+        turn = (edit.index + crc32(self.case.name.encode())) % RARE
+        if turn >= len(FACTORS) or edit.factor != FACTORS[turn]:
+            return None, None
+        known = [self._crossed.before]
+        if edit.truth is not None:
+            key = edit.name, edit.factor
+            if key not in self._due:
+                self._due[key] = self._crossed.found(edit.truth, 0.0)
+            known.append(self._due[key])
+        fresh = self._crossed.found(y).beyond(known)
+        return 10_000.0 * len(fresh.faces) / max(len(self.faces), 1), len(fresh.pieces) > 0
 
 
 def _good(measured: dict[str, float], names: tuple[str, ...]) -> bool:

@@ -37,8 +37,10 @@ TRUTH: dict[str, tuple[str, Format]] = {
     "p99 edge ratio": ("edge_tail", _number(2)),
     "flips / 1000": ("flips", _number(1)),
     "gaps": ("gap", _small),
+    "crossings / 10k": ("crossings", _number(1)),
     "near, %": ("near", _share),
     "passed, %": ("passed", _share),
+    "crossed, %": ("crossed", _share),
 }
 """Columns for inputs whose true edits are known: the measure, and how it is written."""
 NO_TRUTH: dict[str, tuple[str, Format]] = {
@@ -46,8 +48,10 @@ NO_TRUTH: dict[str, tuple[str, Format]] = {
     "flips / 1000": ("flips", _number(1)),
     "degenerate / 1000": ("degenerate", _number(1)),
     "gaps": ("gap", _small),
+    "crossings / 10k": ("crossings", _number(1)),
     "asymmetry": ("asymmetry", _small),
     "sound, %": ("passed", _share),
+    "crossed, %": ("crossed", _share),
 }
 
 

@@ -1,4 +1,4 @@
-"""Whether an edited mesh is a sound one (B6): flips, slivers, gaps and crossings that are new."""
+"""Whether an edited mesh is a sound one (B6): flips, slivers and gaps; `crossed` has the rest."""
 
 from __future__ import annotations
 

@@ -112,6 +112,9 @@ def test_the_truth_passes_and_doing_nothing_does_not(chair: Case) -> None:
     idle = judge.score(edit, Outcome(chair.vertices))
     assert idle.accuracy == pytest.approx(1.0)
     assert not idle.near
+    looked = [judge.score(own, Outcome(own.truth)).crossings for own in chair.edits("true")
+              if own.truth is not None]  # fmt: skip
+    assert sorted(looked, key=str) == [0.0] * 4 + [None] * 12
     with pytest.raises(ValueError, match="vertices"):
         judge.score(edit, Outcome(chair.vertices[1:]))
 

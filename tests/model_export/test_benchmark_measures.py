@@ -11,6 +11,7 @@ from model_export.benchmark.accuracy import (
     surface_accuracy,
 )
 from model_export.benchmark.continuity import evenness, monotone
+from model_export.benchmark.crossed import Crossed
 from model_export.benchmark.detail import edge_ratio, edges_of, laplacian_change
 from model_export.benchmark.identity import digests, same_but_shape, there_and_back
 from model_export.benchmark.service_checks import as_glb
@@ -146,3 +147,44 @@ def test_a_file_is_the_same_but_for_its_shape() -> None:
     assert same_but_shape(upload, moved)
     assert not same_but_shape(upload, as_glb(TRUTH, FACES[:, [1, 2, 0]]).data)
     assert there_and_back(X, X + np.array([0.0, 0.0, 0.3])) == pytest.approx(0.3 / np.sqrt(2))
+
+
+def plates(height: float) -> np.ndarray:
+    """A square that lies, and one across it that stands at a height: four faces."""
+    stands = np.array([[0.5, height, 0.2], [0.5, height, 0.8],
+                       [0.5, height + 1, 0.8], [0.5, height + 1, 0.2]])  # fmt: skip
+    return np.concatenate([X[:, [0, 2, 1]], stands])
+
+
+def test_crossings_count_when_neither_the_input_nor_the_truth_has_them() -> None:
+    faces = np.concatenate([FACES, FACES + 4])
+    apart, through, deeper = plates(0.5), plates(-0.5), plates(-0.6)
+    crossed = Crossed(apart, faces)
+    found = crossed.found(through)
+    assert len(crossed.before.faces) == 0
+    assert len(found.faces) > 0
+    assert len(set(found.pieces)) == 1
+    assert len(found.beyond([crossed.before]).faces) == len(found.faces)
+    assert len(found.beyond([crossed.before, crossed.found(through, 0.0)]).faces) == 0
+    already = Crossed(through, faces)
+    assert len(already.found(deeper).beyond([already.before]).pieces) == 0
+
+
+def test_pieces_that_slide_cross_in_other_faces_but_are_no_new_pair() -> None:
+    faces = np.concatenate([FACES, FACES + 4])
+    beside = plates(-0.5)
+    beside[4:, 0] += 0.3
+    beside[4:, 2] = [0.05, 0.15, 0.15, 0.05]
+    crossed = Crossed(beside, faces)
+    fresh = crossed.found(plates(-0.5)).beyond([crossed.before])
+    assert len(fresh.faces) > 0
+    assert len(fresh.pieces) == 0
+
+
+def test_faces_at_a_seam_do_not_cross() -> None:
+    # The same square twice, folded along the seam between copies of its vertices.
+    twice = np.concatenate([X, X * [-1.0, 1.0, 1.0]])
+    folded = twice.copy()
+    folded[4:, 2] += 0.3 * np.abs(folded[4:, 0])
+    crossed = Crossed(twice, np.concatenate([FACES, FACES + 4]))
+    assert len(crossed.found(folded).faces) == 0
