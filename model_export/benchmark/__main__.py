@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from model_export.benchmark.inputs import (
 )
 from model_export.benchmark.outliers import outlier_cases
 from model_export.benchmark.report import Checks, write_report
+from model_export.benchmark.robustness import Stand, section, stands
 from model_export.benchmark.runner import Results, run_case
 from model_export.benchmark.service_checks import continuity, identity, mirrored_parameters
 from model_export.benchmark.sheet import draw_rivals
@@ -41,7 +42,15 @@ DRAWN = {
 
 @dataclass(frozen=True)
 class Plan:
-    """How much of each source: D, S and R a category; and how finely D is cut."""
+    """How much of each source.
+
+    Attributes:
+        detailed, templates, real: inputs of D, S and R, a category.
+        density: how finely D is cut.
+        sliders, checked: parameters and inputs that the whole service is asked about.
+        robust: inputs of D, and of R, that are disturbed,
+        turns: turned so many ways; and one a category has two million vertices, where `many`.
+    """
 
     detailed: int
     templates: int
@@ -49,9 +58,13 @@ class Plan:
     density: int | None
     sliders: int
     checked: int
+    robust: int
+    turns: int
+    many: bool
 
 
-FULL, QUICK = Plan(12, 4, 8, None, 8, 3), Plan(2, 1, 2, 2, 1, 1)
+FULL = Plan(12, 4, 8, None, sliders=8, checked=3, robust=3, turns=24, many=True)
+QUICK = Plan(2, 1, 2, 2, sliders=1, checked=1, robust=1, turns=4, many=False)
 
 
 def cases(model: Model, plan: Plan, folder: Path | None) -> Iterator[tuple[int, Case]]:
@@ -76,6 +89,20 @@ def check(model: Model, plan: Plan) -> Checks:
         mirrored=[mirrored_parameters(model, case) for case in some],
         sliders=continuity(model, some[0], names),
     )
+
+
+def robust(models: Mapping[str, Model], name: str, plan: Plan, folder: Path | None) -> list[Stand]:
+    """B12: what the service makes of disturbed files, all categories being possible."""
+    sources = [detailed_cases(models[name], plan.robust, plan.density)]
+    if folder is not None:
+        sources.append(real_cases(models[name], folder, plan.robust))
+    found: list[Stand] = []
+    for source in sources:
+        for case in source:
+            many = plan.many and not found
+            mesh = case.vertices, case.faces
+            found += stands(models, name, case.source, *mesh, plan.turns, many)
+    return found
 
 
 def draw(models: dict[str, Model], rivals: dict[str, Entry], path: Path) -> None:
@@ -113,15 +140,19 @@ def main() -> None:
     models = load_models(options.models)
     results = Results(options.out / "results.jsonl")
     folders = {"chair": options.chairs, "airplane": options.airplanes}
-    checks = {}
+    rigid = {name: models[name] for name in CATEGORIES}
+    checks, stood = {}, list[Stand]()
     for name in CATEGORIES:
         for number, case in cases(models[name], plan, folders[name]):
             run_case(case, number, rivals, results, say)
         say(f"the service as a whole, {name}")
         checks[name] = check(models[name], plan)
+        say(f"disturbed files, {name}")
+        stood += robust(rigid, name, plan, folders[name])
+    sections = {"Disturbed files": section(stood)}
     say("pictures")
     draw(models, rivals, options.out / "rivals.png")
-    write_report(results.rows, checks, options.out / "report.md")
+    write_report(results.rows, checks, sections, options.out / "report.md")
     say(f"wrote {options.out / 'report.md'}")
 
 

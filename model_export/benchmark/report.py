@@ -53,8 +53,10 @@ class Checks:
     sliders: Mapping[str, tuple[float, float]]
 
 
-def write_report(rows: Sequence[Row], checks: Mapping[str, Checks], path: Path) -> None:
-    """Write the page."""
+def write_report(
+    rows: Sequence[Row], checks: Mapping[str, Checks], sections: Mapping[str, str], path: Path
+) -> None:
+    """Write the page; what else was measured comes under titles of its own."""
     parts = [HEAD]
     for source, title in SOURCES.items():
         for category in dict.fromkeys(row["category"] for row in rows):
@@ -68,6 +70,7 @@ def write_report(rows: Sequence[Row], checks: Mapping[str, Checks], path: Path) 
                 parts.append(f"### `blend`, by parameter\n\n{by_edit(own, 'blend', 'true')}\n")
                 parts.append(f"### Where `blend` distorts most\n\n{worst(own, 'blend', 'true')}\n")
     parts.append("## The service as a whole\n\n" + _checks(checks) + "\n")
+    parts += [f"## {title}\n\n{text}\n" for title, text in sections.items()]
     parts.append("## Time\n\n" + seconds(rows) + "\n")
     path.write_text("\n".join(parts), "utf-8")
 

@@ -18,6 +18,7 @@ from model_export.benchmark.inputs import DETAILED, detailed_case, template_case
 from model_export.benchmark.known import Known, told, wrong_by
 from model_export.benchmark.outliers import OUTLIERS
 from model_export.benchmark.report import Checks, write_report
+from model_export.benchmark.robustness import Stand
 from model_export.benchmark.runner import Results, run_case, time_limit
 from model_export.benchmark.score import Judge
 from model_export.benchmark.service_checks import Identity
@@ -197,6 +198,8 @@ def test_the_command_writes_a_page_of_all_sources(
     monkeypatch.setattr(command, "cases", lambda *_: [(0, chair)])
     monkeypatch.setattr(command, "check", lambda *_: checks)
     monkeypatch.setattr(command, "draw", lambda *_: None)
+    stand = Stand("D", "chair", "holes", recognised=True, upright=True, drift=(0.02,))
+    monkeypatch.setattr(command, "robust", lambda *_: [stand])
     monkeypatch.setattr(command, "CATEGORIES", ("chair",))
     monkeypatch.setattr(sys, "argv", ["benchmark", "--out", str(tmp_path), "--rival", "blend"])
     command.main()
@@ -204,6 +207,7 @@ def test_the_command_writes_a_page_of_all_sources(
     assert "## D, chairs" in page
     assert "| blend |" in page
     assert "| chair | 1 of 1 | 8 of 8 |" in page
+    assert "| D, chairs | holes | 1 | 100.0 |" in page
     rows = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
     assert [row["known"] for row in rows] == ["true", "off", "inferred"]
 
@@ -215,5 +219,7 @@ def test_a_page_has_tables_without_truth_for_real_shapes(chair: Case, tmp_path: 
     assert {row["rival"] for row in rows} == {"blend"}
     assert rows[0]["scores"][0]["detail"] is not None
     checks = Checks([Identity(True, 1, 1, 0.0)], [0.0], {"seat_width": (1.0, 1.0)})
-    write_report(rows, {"chair": checks}, tmp_path / "report.md")
-    assert "Laplacian change" in (tmp_path / "report.md").read_text()
+    write_report(rows, {"chair": checks}, {"More": "said."}, tmp_path / "report.md")
+    page = (tmp_path / "report.md").read_text()
+    assert "Laplacian change" in page
+    assert "## More\n\nsaid.\n" in page
