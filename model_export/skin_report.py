@@ -2,11 +2,13 @@
 ``python -m model_export.skin_report --originals DIR``.
 
 Rigged characters are posed, a body is fitted as the service does, and single joints are turned by
-30 and 60 degrees either way, by the rig and by each transfer rule.  Distances between the results
-(V2V) are means over the vertices, in millimetres at a stature of 1.7 m.  Turns are about the fitted
-joint; about it, moved by the mean offset of the rig's joints in the files of one convention of
-names, which takes out that rigs define joints otherwise; and about the rig's own, which leaves what
-is due to weights.  An edge is torn when it ends up longer than 4 times what it is under the rig.
+30 and 60 degrees either way, by the rig and by each transfer rule: the service's skinning, the
+nearest vertex's weights, inpainted weights (`rivals.inpainting`), and the paper's rule.  Distances
+between the results (V2V) are means over the vertices, in millimetres at a stature of 1.7 m.  Turns
+are about the fitted joint; about it, moved by the mean offset of the rig's joints in the files of
+one convention of names, which takes out that rigs define joints otherwise; and about the rig's own,
+which leaves what is due to weights.  An edge is torn when it ends up longer than 4 times what it is
+under the rig.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from scipy.spatial.transform import Rotation
 
 from model_export.config import SHIPPED
 from model_export.rigs import POSES, Rig, posed, read_rig
+from model_export.rivals.inpainting import inpainted
 from model_export.skin_fit import Fit, fit_joints, served_fit
 from service.deform import bodypaper, skinbinding
 from service.encode.bodymodel import BodyModel
@@ -106,10 +109,16 @@ def prepare(
     """Fit a body to a character in some of the `POSES`."""
     unit = float(np.ptp(rig.vertices[:, 1])) / STATURE
     for pose in poses:
-        before = posed(rig, POSES[pose])
-        body = fit(before.vertices, before.faces, before.positions)
-        turned = pose_joints(body.rotations, template.joints, PARENTS)[0]
-        yield Case(character, pose, before, body, turned, template.posed_joints(body), unit)
+        yield fitted((character, pose), posed(rig, POSES[pose]), template, fit, unit)
+
+
+def fitted(
+    names: tuple[str, str], rig: Rig, template: SkinnedTemplate, fit: Fit, unit: float
+) -> Case:
+    """Fit a body to a character in its pose, the names of both being given."""
+    body = fit(rig.vertices, rig.faces, rig.positions)
+    turned = pose_joints(body.rotations, template.joints, PARENTS)[0]
+    return Case(*names, rig, body, turned, template.posed_joints(body), unit)
 
 
 def mean_offsets(cases: Sequence[Case]) -> dict[str, Array]:
@@ -164,9 +173,11 @@ def bind_all(
         return x + share * ((x - pivot) @ (rotation - np.eye(3)).T)
 
     skin = skinbinding.bind(x, faces, template, body).weights
+    painted = inpainted(x, faces, template, body)
     return {
         "skin": lambda *edit: turn(x, skin, *edit),
         "nearest": lambda *edit: turn(x, nearest, *edit),
+        "inpainted": lambda *edit: turn(x, painted, *edit),
         "paper": lambda *edit: x + paper.carried(turn(surface, template.weights, *edit) - surface),
     }
 
@@ -222,7 +233,14 @@ def main() -> None:
     assert isinstance(model, BodyModel)
     fit = fit_joints(model.template) if options.told else served_fit(model)
     files = sorted(options.originals.glob("*.glb"))
-    scores = report(files, model.template, fit, options.poses)
+    cases = [
+        case
+        for file in files
+        for case in prepare(
+            file.stem, read_rig(file.read_bytes()), model.template, fit, options.poses
+        )
+    ]
+    scores = score_all(cases, model.template)
     keys: list[Callable[[Score], str]] = [
         lambda score: "all",
         lambda score: score.pose,
@@ -234,15 +252,8 @@ def main() -> None:
         options.out.write_text(json.dumps([asdict(score) for score in scores], indent=1))
 
 
-def report(
-    paths: Sequence[Path], template: SkinnedTemplate, fit: Fit, poses: Sequence[str]
-) -> list[Score]:
-    """Scores of all edits of rigged characters in some of the `POSES`."""
-    cases = [
-        case
-        for path in paths
-        for case in prepare(path.stem, read_rig(path.read_bytes()), template, fit, poses)
-    ]
+def score_all(cases: Sequence[Case], template: SkinnedTemplate) -> list[Score]:
+    """Scores of all edits."""
     offsets = mean_offsets(cases)
     return [
         score

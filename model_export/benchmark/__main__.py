@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from model_export.benchmark.bodysection import body_section
 from model_export.benchmark.case import Case
 from model_export.benchmark.inputs import (
     DETAILED,
@@ -30,6 +31,7 @@ from model_export.benchmark.service_checks import continuity, identity, mirrored
 from model_export.benchmark.sheet import draw_rivals
 from model_export.config import SHIPPED
 from model_export.rivals.registry import RIVALS, Entry
+from service.encode.bodymodel import BodyModel
 from service.encode.model import Model, load_models
 
 CATEGORIES = ("chair", "airplane")
@@ -50,6 +52,7 @@ class Plan:
         sliders, checked: parameters and inputs that the whole service is asked about.
         robust: inputs of D, and of R, that are disturbed,
         turns: turned so many ways; and one a category has two million vertices, where `many`.
+        bodies: synthetic ones.
     """
 
     detailed: int
@@ -61,10 +64,11 @@ class Plan:
     robust: int
     turns: int
     many: bool
+    bodies: int
 
 
-FULL = Plan(12, 4, 8, None, sliders=8, checked=3, robust=3, turns=24, many=True)
-QUICK = Plan(2, 1, 2, 2, sliders=1, checked=1, robust=1, turns=4, many=False)
+FULL = Plan(12, 4, 8, None, sliders=8, checked=3, robust=3, turns=24, many=True, bodies=12)
+QUICK = Plan(2, 1, 2, 2, sliders=1, checked=1, robust=1, turns=4, many=False, bodies=2)
 
 
 def cases(model: Model, plan: Plan, folder: Path | None) -> Iterator[tuple[int, Case]]:
@@ -122,6 +126,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a few inputs, without slow rivals")
     parser.add_argument("--chairs", type=Path, help="folder of real chairs")
     parser.add_argument("--airplanes", type=Path, help="folder of real airplanes")
+    parser.add_argument("--humans", type=Path, help="folder of characters with known joints")
     parser.add_argument("--models", type=Path, default=SHIPPED, help="models folder")
     parser.add_argument("--rival", choices=RIVALS, action="append", help="these only")
     options = parser.parse_args()
@@ -149,7 +154,12 @@ def main() -> None:
         checks[name] = check(models[name], plan)
         say(f"disturbed files, {name}")
         stood += robust(rigid, name, plan, folders[name])
-    sections = {"Disturbed files": section(stood)}
+    human = models["human"]
+    assert isinstance(human, BodyModel)
+    sections = {
+        "Disturbed files": section(stood),
+        "H: Bodies": body_section(human, plan.bodies, options.humans, say),
+    }
     say("pictures")
     draw(models, rivals, options.out / "rivals.png")
     write_report(results.rows, checks, sections, options.out / "report.md")

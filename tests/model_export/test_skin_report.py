@@ -10,9 +10,8 @@ from model_export.skin_report import (
     ANGLES,
     Score,
     edits,
-    mean_offsets,
     prepare,
-    score_case,
+    score_all,
     table,
     torn,
 )
@@ -47,7 +46,7 @@ def own_rig(off: float = 0.0) -> Rig:
 @pytest.fixture(scope="module")
 def scores():
     cases = list(prepare("own", own_rig(0.02), TEMPLATE, lambda *_: REST, ["rest"]))
-    return list(score_case(cases[0], TEMPLATE, mean_offsets(cases)["own"]))
+    return score_all(cases, TEMPLATE)
 
 
 def mean(scores, rule, field):
@@ -55,7 +54,7 @@ def mean(scores, rule, field):
 
 
 def test_every_edit_has_a_score_of_each_rule(scores):
-    assert len(scores) == 3 * len(list(edits()))
+    assert len(scores) == 4 * len(list(edits()))
     assert {score.angle for score in scores} == set(ANGLES)
     assert {score.joint for score in scores} >= {"left_elbow", "right_knee", "head", "spine2"}
 
@@ -63,6 +62,7 @@ def test_every_edit_has_a_score_of_each_rule(scores):
 def test_the_templates_own_weights_are_right_but_for_the_joints(scores):
     assert mean(scores, "nearest", "v2v_rig") < 1e-9
     assert mean(scores, "skin", "v2v_rig") < 0.3
+    assert mean(scores, "inpainted", "v2v_rig") < 0.3
     assert mean(scores, "paper", "v2v_rig") > 0.5
     assert mean(scores, "nearest", "v2v") > 1.0
 
