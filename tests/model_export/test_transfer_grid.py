@@ -11,7 +11,8 @@ from plain_chair import PLAIN
 
 from model_export import transfer_grid
 from model_export.realistic import RealisticShape
-from model_export.transfer_grid import Pair, Shape, distance, found, main, panels, table
+from model_export.rivals.cage import Cage
+from model_export.transfer_grid import Pair, Shape, caged, distance, found, main, panels, table
 from service.template.loader import load_template
 
 
@@ -54,6 +55,20 @@ def test_a_shape_is_no_way_from_itself_and_some_way_from_others(tmp_path: Path) 
     assert distance(one, one) < 1e-3 < 0.01 < distance(one, other)
 
 
+def test_a_cage_comes_nearer_than_stretching_and_a_change_of_axes_is_exact(tmp_path: Path) -> None:
+    one = shape(write_chair(tmp_path / "one.ply"))
+    other = shape(write_chair(tmp_path / "other.ply", back_height=0.7, leg_height=0.3))
+    cage = Cage.about(one.vertices)
+    np.testing.assert_allclose(cage.weights @ cage.corners, one.vertices, atol=1e-6)
+    ratio = np.ptp(other.vertices, axis=0) / np.ptp(one.vertices, axis=0)
+    stretched = one.moved(one.vertices * ratio)
+    shift = other.vertices.min(axis=0) - stretched.vertices.min(axis=0)
+    plain = distance(stretched.moved(stretched.vertices + shift), other)
+    assert caged(one, other, cage) < 0.7 * plain
+    wider = one.moved(one.vertices * [1.3, 1.0, 0.8])
+    assert caged(one, wider, cage) < 1e-3
+
+
 def test_held_out_shapes_are_taken_by_licence(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -71,17 +86,18 @@ def test_held_out_shapes_are_taken_by_licence(
 
 def test_the_table_tells_how_often_the_transfer_is_nearer(tmp_path: Path) -> None:
     own = shape(write_chair(tmp_path / "own.ply"))
-    grid = [[Pair(own, 0.04, 0.02, 0.01), Pair(own, 0.02, 0.01, 0.03)]]
+    grid = [[Pair(own, 0.04, 0.02, 0.03, 0.01), Pair(own, 0.02, 0.01, 0.02, 0.03)]]
     assert table(grid).splitlines()[2:] == [
         "| source | 3.00 | 3.00 | 50 % of 2 |",
         "| stretched | 1.50 | 1.50 | 50 % of 2 |",
+        "| caged | 2.50 | 2.50 | 50 % of 2 |",
         "| transferred | 2.00 | 2.00 |  |",
     ]
 
 
 def test_the_grid_has_bands_of_targets(tmp_path: Path) -> None:
     own = shape(write_chair(tmp_path / "own.ply"))
-    pair = Pair(own, 0.1, 0.1, 0.1)
+    pair = Pair(own, 0.1, 0.1, 0.1, 0.1)
     drawn = panels([own, own], [own] * 3, [[pair] * 3] * 2, across=2)
     assert len(drawn) == 2 * (1 + 2) * (1 + 2)
     assert [bool(panel.meshes) for panel in drawn] == (
@@ -111,4 +127,4 @@ def test_it_is_drawn_and_measured_by_one_command(
     assert last[1].strip() == "transferred"
     # Boxes like boxes: the transfer leaves next to nothing.
     assert float(last[2]) < 0.5
-    assert "100 % of 2" in lines[-3]
+    assert "100 % of 2" in lines[-4]
