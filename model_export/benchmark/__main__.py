@@ -16,6 +16,12 @@ from pathlib import Path
 
 from model_export.benchmark.bodysection import body_section
 from model_export.benchmark.case import Case
+from model_export.benchmark.inference import (
+    detailed_shapes,
+    inference_section,
+    recovery_table,
+    template_shapes,
+)
 from model_export.benchmark.inputs import (
     DETAILED,
     detailed_case,
@@ -31,6 +37,7 @@ from model_export.benchmark.service_checks import continuity, identity, mirrored
 from model_export.benchmark.sheet import draw_rivals
 from model_export.config import SHIPPED
 from model_export.rivals.registry import RIVALS, Entry
+from service.encode.affinemodel import AffineModel
 from service.encode.bodymodel import BodyModel
 from service.encode.model import Model, load_models
 
@@ -53,6 +60,7 @@ class Plan:
         robust: inputs of D, and of R, that are disturbed,
         turns: turned so many ways; and one a category has two million vertices, where `many`.
         bodies: synthetic ones.
+        recovered: shapes of S, and of D, a category, that rivals infer the parameters of.
     """
 
     detailed: int
@@ -65,10 +73,25 @@ class Plan:
     turns: int
     many: bool
     bodies: int
+    recovered: tuple[int, int]
 
 
-FULL = Plan(12, 4, 8, None, sliders=8, checked=3, robust=3, turns=24, many=True, bodies=12)
-QUICK = Plan(2, 1, 2, 2, sliders=1, checked=1, robust=1, turns=4, many=False, bodies=2)
+FULL = Plan(
+    12,
+    4,
+    8,
+    None,
+    sliders=8,
+    checked=3,
+    robust=3,
+    turns=24,
+    many=True,
+    bodies=12,
+    recovered=(1000, 50),
+)
+QUICK = Plan(
+    2, 1, 2, 2, sliders=1, checked=1, robust=1, turns=4, many=False, bodies=2, recovered=(50, 4)
+)
 
 
 def cases(model: Model, plan: Plan, folder: Path | None) -> Iterator[tuple[int, Case]]:
@@ -109,6 +132,14 @@ def robust(models: Mapping[str, Model], name: str, plan: Plan, folder: Path | No
     return found
 
 
+def recover(model: Model, plan: Plan) -> str:
+    """B1: what each way of inferring makes of shapes whose parameters are known."""
+    assert isinstance(model, AffineModel)
+    fresh, detailed = plan.recovered
+    sources = template_shapes(model, fresh), detailed_shapes(model, detailed, 2)
+    return recovery_table(model, sources)
+
+
 def draw(models: dict[str, Model], rivals: dict[str, Entry], path: Path) -> None:
     """The edits of `DRAWN`."""
     wanted = []
@@ -146,7 +177,7 @@ def main() -> None:
     results = Results(options.out / "results.jsonl")
     folders = {"chair": options.chairs, "airplane": options.airplanes}
     rigid = {name: models[name] for name in CATEGORIES}
-    checks, stood = {}, list[Stand]()
+    checks, stood, inferred = {}, list[Stand](), list[str]()
     for name in CATEGORIES:
         for number, case in cases(models[name], plan, folders[name]):
             run_case(case, number, rivals, results, say)
@@ -154,9 +185,12 @@ def main() -> None:
         checks[name] = check(models[name], plan)
         say(f"disturbed files, {name}")
         stood += robust(rigid, name, plan, folders[name])
+        say(f"inference, {name}")
+        inferred.append(recover(models[name], plan))
     human = models["human"]
     assert isinstance(human, BodyModel)
     sections = {
+        "Inference": inference_section(inferred),
         "Disturbed files": section(stood),
         "H: Bodies": body_section(human, plan.bodies, options.humans, say),
     }

@@ -199,6 +199,7 @@ def test_the_command_writes_a_page_of_all_sources(
     monkeypatch.setattr(command, "check", lambda *_: checks)
     monkeypatch.setattr(command, "draw", lambda *_: None)
     stand = Stand("D", "chair", "holes", recognised=True, upright=True, drift=(0.02,))
+    monkeypatch.setattr(command, "recover", lambda *_: "| S, 2 chairs | constant |")
     monkeypatch.setattr(command, "body_section", lambda *_: "Bodies stand.")
     monkeypatch.setattr(command, "robust", lambda *_: [stand])
     monkeypatch.setattr(command, "CATEGORIES", ("chair",))
@@ -209,6 +210,7 @@ def test_the_command_writes_a_page_of_all_sources(
     assert "| blend |" in page
     assert "| chair | 1 of 1 | 8 of 8 |" in page
     assert "Bodies stand." in page
+    assert "| S, 2 chairs | constant |" in page
     assert "| D, chairs | holes | 1 | 100.0 |" in page
     rows = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
     assert [row["known"] for row in rows] == ["true", "off", "inferred"]
