@@ -1,8 +1,8 @@
 """Every rival on the same inputs: ``python -m model_export.benchmark --out DIR``.
 
-Writes `report.md`, `rivals.png` and `results.jsonl`.  A run that is cut off goes on where it was:
-remove `results.jsonl` to begin anew.  As-rigid-as-possible and re-synthesis need the extra
-`benchmark`.
+Writes `report.md` and `rivals.png`, and keeps `results.jsonl` and `sections.jsonl`: a run that is
+cut off goes on where it was.  Name another folder to begin anew.  As-rigid-as-possible and
+re-synthesis need the extra `benchmark`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from model_export.benchmark.bodysection import body_section
@@ -29,16 +30,16 @@ from model_export.benchmark.inputs import (
     real_cases,
     template_cases,
 )
+from model_export.benchmark.kept import Kept
 from model_export.benchmark.outliers import outlier_cases
 from model_export.benchmark.report import Checks, write_report
-from model_export.benchmark.robustness import Stand, section, stands
+from model_export.benchmark.robustness import Stand, robustness_section, stands, table
 from model_export.benchmark.runner import Results, run_case
 from model_export.benchmark.service_checks import continuity, identity, mirrored_parameters
 from model_export.benchmark.sheet import draw_rivals
 from model_export.config import SHIPPED
 from model_export.rivals.registry import RIVALS, Entry
 from service.encode.affinemodel import AffineModel
-from service.encode.bodymodel import BodyModel
 from service.encode.model import Model, load_models
 
 CATEGORIES = ("chair", "airplane")
@@ -118,7 +119,7 @@ def check(model: Model, plan: Plan) -> Checks:
     )
 
 
-def robust(models: Mapping[str, Model], name: str, plan: Plan, folder: Path | None) -> list[Stand]:
+def robust(models: Mapping[str, Model], name: str, plan: Plan, folder: Path | None) -> str:
     """B12: what the service makes of disturbed files, all categories being possible."""
     sources = [detailed_cases(models[name], plan.robust, plan.density)]
     if folder is not None:
@@ -129,7 +130,7 @@ def robust(models: Mapping[str, Model], name: str, plan: Plan, folder: Path | No
             many = plan.many and not found
             mesh = case.vertices, case.faces
             found += stands(models, name, case.source, *mesh, plan.turns, many)
-    return found
+    return table(found)
 
 
 def recover(model: Model, plan: Plan) -> str:
@@ -177,22 +178,23 @@ def main() -> None:
     results = Results(options.out / "results.jsonl")
     folders = {"chair": options.chairs, "airplane": options.airplanes}
     rigid = {name: models[name] for name in CATEGORIES}
-    checks, stood, inferred = {}, list[Stand](), list[str]()
+    kept = Kept(options.out / "sections.jsonl")
+    checks, stood, recovered = {}, list[str](), list[str]()
     for name in CATEGORIES:
         for number, case in cases(models[name], plan, folders[name]):
             run_case(case, number, rivals, results, say)
         say(f"the service as a whole, {name}")
         checks[name] = check(models[name], plan)
         say(f"disturbed files, {name}")
-        stood += robust(rigid, name, plan, folders[name])
+        disturbed = partial(robust, rigid, name, plan, folders[name])
+        stood.append(kept.get(f"disturbed, {name}", disturbed))
         say(f"inference, {name}")
-        inferred.append(recover(models[name], plan))
-    human = models["human"]
-    assert isinstance(human, BodyModel)
+        recovered.append(kept.get(f"inference, {name}", partial(recover, models[name], plan)))
+    bodies = partial(body_section, models["human"], plan.bodies, options.humans, say)
     sections = {
-        "Inference": inference_section(inferred),
-        "Disturbed files": section(stood),
-        "H: Bodies": body_section(human, plan.bodies, options.humans, say),
+        "Inference": inference_section(recovered),
+        "Disturbed files": robustness_section(stood),
+        "H: Bodies": kept.get("bodies", bodies),
     }
     say("pictures")
     draw(models, rivals, options.out / "rivals.png")

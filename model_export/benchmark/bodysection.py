@@ -18,6 +18,7 @@ from model_export.benchmark.characters import characters
 from model_export.benchmark.unlikebodies import sound_table, unlike
 from model_export.realistic import find_shapes
 from service.encode.bodymodel import BodyModel
+from service.encode.model import Model
 
 ABOUT = """Synthetic bodies have a random pose, shape and clothes, every other one 2500 vertices;
 their rig is the template's, their fit the service's own, from the surface alone.  Millimetres are
@@ -31,9 +32,7 @@ either way: no truth is known.  Crossings are new pairs of faces against the inp
 skin that folds at a joint, or of clothes that slide on it."""
 
 
-def body_section(
-    model: BodyModel, count: int, folder: Path | None, say: Callable[[str], None]
-) -> str:
+def body_section(model: Model, count: int, folder: Path | None, say: Callable[[str], None]) -> str:
     """So many synthetic bodies, and the held-out characters of a folder.
 
     Args:
@@ -42,6 +41,7 @@ def body_section(
         folder: of characters, with a manifest that has their joints.
         say: told what is done next.
     """
+    assert isinstance(model, BodyModel)
     own, shapes = characters(model.template, count), find_shapes(folder) if folder else []
     held_out = [s for s in shapes if s.held_out and "joints_smpl24" in s.info]
     say("bodies: joints")

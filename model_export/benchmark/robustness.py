@@ -108,9 +108,9 @@ parameters against the clean file whose category and orientation are told.  The 
 answered, and a drift below 10 %."""
 
 
-def section(rows: Sequence[Stand]) -> str:
-    """What is done, and what came of it."""
-    return f"{ABOUT}\n\n{table(rows)}"
+def robustness_section(tables: Sequence[str]) -> str:
+    """What is done, and what came of it in each category."""
+    return "\n\n".join([ABOUT, *tables])
 
 
 def table(rows: Sequence[Stand]) -> str:

@@ -15,10 +15,12 @@ from model_export.benchmark import __main__ as command
 from model_export.benchmark import inputs
 from model_export.benchmark.case import Case
 from model_export.benchmark.inputs import DETAILED, detailed_case, template_cases
+from model_export.benchmark.kept import Kept
 from model_export.benchmark.known import Known, told, wrong_by
 from model_export.benchmark.outliers import OUTLIERS
 from model_export.benchmark.report import Checks, write_report
 from model_export.benchmark.robustness import Stand
+from model_export.benchmark.robustness import table as stood
 from model_export.benchmark.runner import Results, run_case, time_limit
 from model_export.benchmark.score import Judge
 from model_export.benchmark.service_checks import Identity
@@ -201,7 +203,7 @@ def test_the_command_writes_a_page_of_all_sources(
     stand = Stand("D", "chair", "holes", recognised=True, upright=True, drift=(0.02,))
     monkeypatch.setattr(command, "recover", lambda *_: "| S, 2 chairs | constant |")
     monkeypatch.setattr(command, "body_section", lambda *_: "Bodies stand.")
-    monkeypatch.setattr(command, "robust", lambda *_: [stand])
+    monkeypatch.setattr(command, "robust", lambda *_: stood([stand]))
     monkeypatch.setattr(command, "CATEGORIES", ("chair",))
     monkeypatch.setattr(sys, "argv", ["benchmark", "--out", str(tmp_path), "--rival", "blend"])
     command.main()
@@ -214,6 +216,16 @@ def test_the_command_writes_a_page_of_all_sources(
     assert "| D, chairs | holes | 1 | 100.0 |" in page
     rows = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
     assert [row["known"] for row in rows] == ["true", "off", "inferred"]
+
+
+def test_what_is_kept_is_not_made_again(tmp_path: Path) -> None:
+    path = tmp_path / "kept.jsonl"
+    assert Kept(path).get("one", lambda: "first") == "first"
+    assert Kept(path).get("two", lambda: "second") == "second"
+    path.write_text(path.read_text()[:-5])
+    again = Kept(path)
+    assert again.get("one", lambda: "other") == "first"
+    assert again.get("two", lambda: "other") == "other"
 
 
 def test_a_page_has_tables_without_truth_for_real_shapes(chair: Case, tmp_path: Path) -> None:

@@ -182,6 +182,7 @@ def test_unlike_bodies_are_judged_by_each_rule(tmp_path: Path, at_rest: None) ->
 def test_a_section_has_what_the_folder_allows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(bodysection, "BodyModel", SimpleNamespace)
     monkeypatch.setattr(bodysection, "joint_table", lambda *_: "joints")
     monkeypatch.setattr(bodysection, "moved_scores", lambda *_: [])
     monkeypatch.setattr(bodysection, "moved_table", lambda *_: "moved")
