@@ -128,7 +128,7 @@ def predictions(model: AffineModel, known: Labelled, guess: Guess) -> dict[str, 
         fit = refine(start, guess.mean[:size], guess.mean[size:], cloud, STANDARD)
         rows["mean"].append(np.concatenate([fit.parameters, fit.translation]))
         encoding = model.encode(cloud.points)
-        shares = encoding.shares if names else []
+        shares = encoding.shares if names else np.zeros(0)
         rows["encoder"].append(np.concatenate([encoding.parameters, encoding.translation, shares]))
         found = estimate(model, drawn)
         variant = [float(name == found.template.variant) for name in names]
