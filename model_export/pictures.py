@@ -14,13 +14,19 @@ matplotlib.use("Agg")
 
 from matplotlib import pyplot
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+
+from model_export.raster import paint
 
 Array = NDArray[np.float64]
 
 YELLOW = (0.93, 0.78, 0.36)
 BLUE = (0.25, 0.47, 0.85)
 GREY = (0.66, 0.68, 0.71)
+PIXELS = 480
+"""Of the side of a panel before it is scaled to its place on the sheet."""
+
+Colour = tuple[float, float, float] | Array
+"""Of a mesh; or ``[F, 3]``, of each of its faces."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +40,7 @@ class Panel:
     """
 
     title: str
-    meshes: Sequence[tuple[Array, NDArray[np.int64], tuple[float, float, float], float]]
+    meshes: Sequence[tuple[Array, NDArray[np.int64], Colour, float]]
 
 
 def view(azimuth: float = 35.0, elevation: float = 20.0) -> Array:
@@ -45,31 +51,25 @@ def view(azimuth: float = 35.0, elevation: float = 20.0) -> Array:
     return about_x @ about_y
 
 
+def faces_of(panel: Panel, camera: Array) -> tuple[Array, Array, Array]:
+    """Corners ``[F, 3, 3]`` as a camera has them, colours ``[F, 3]`` and opacities ``[F]``."""
+    corners, colours, opacity = [], [], []
+    for vertices, faces, colour, share in panel.meshes:
+        corners.append((vertices @ camera.T)[faces])
+        colours.append(np.broadcast_to(np.asarray(colour), (len(faces), 3)))
+        opacity.append(np.full(len(faces), share))
+    return np.concatenate(corners), np.concatenate(colours), np.concatenate(opacity)
+
+
 def draw(axes: Axes, panel: Panel, camera: Array) -> None:
-    """Draw a panel's meshes, far faces first, shaded by their normals."""
-    triangles, colours = [], []
-    light = np.array([0.3, 0.6, 0.74])
-    for vertices, faces, colour, opacity in panel.meshes:
-        corners = (vertices @ camera.T)[faces]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-        shade = 0.35 + 0.65 * np.abs(normals @ light)
-        triangles.append(corners)
-        rgb = np.clip(shade[:, None] * np.array(colour), 0, 1)
-        colours.append(np.column_stack([rgb, np.full(len(faces), opacity)]))
-    corners, rgba = np.concatenate(triangles), np.concatenate(colours)
-    order = np.argsort(corners[:, :, 2].mean(axis=1))
-    edge = np.where(rgba[order, 3:] < 1, 0.0, 1.0) * rgba[order]
-    axes.add_collection(
-        PolyCollection(
-            corners[order][:, :, :2], facecolors=rgba[order], edgecolors=edge, linewidths=0.2
-        )
-    )
+    """Draw a panel's meshes, near faces over far ones, shaded by their normals."""
+    corners, colours, opacity = faces_of(panel, camera)
     flat = corners[:, :, :2].reshape(-1, 2)
     middle, half = (flat.min(0) + flat.max(0)) / 2, 0.54 * np.ptp(flat, axis=0).max()
-    axes.set_xlim(middle[0] - half, middle[0] + half)
-    axes.set_ylim(middle[1] - half, middle[1] + half)
-    axes.set_aspect("equal")
+    scale = PIXELS / 2 / half
+    picture = paint(corners, colours, opacity, middle, scale, (PIXELS, PIXELS))
+    sides = (middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half)
+    axes.imshow(picture, extent=sides)
     axes.axis("off")
     axes.set_title(panel.title, fontsize=7)
 
