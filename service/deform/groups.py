@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 
 from service.template.affine import AffineTemplate
 
+# How far rows may differ where a follower adds to them, and still move alike: a seat that is
+# narrower at the rear takes the rear legs out by less when it is widened.
+ALIKE = 0.3
+
 
 @dataclass(frozen=True)
 class Group:
@@ -30,22 +34,32 @@ def mirror_groups(template: AffineTemplate) -> list[Group]:
 
     Only what users change counts: rear legs that lean more than those in front are legs like them.
     """
-    frames = offered_rows(template)
+    frames, slack = offered_rows(template), slack_rows(template)
     groups: list[list[int]] = []
     for part, frame in enumerate(frames):
         for group in groups:
-            if any(_alike(s * frames[group[0]], frame) for s in _signs()):
+            room = np.maximum(slack[group[0]], slack[part])
+            if any(_alike(s * frames[group[0]], frame, room) for s in _signs()):
                 group.append(part)
                 break
         else:
             groups.append([part])
-    return [Group(tuple(g), _partners(frames[g])) for g in groups]
+    return [Group(tuple(g), _partners(frames[g], slack[g].max(axis=0))) for g in groups]
 
 
 def offered_rows(template: AffineTemplate) -> NDArray[np.float64]:
     """``[P, 3, 4, 1 + p]`` affine rows of the frames in the parameters that users change."""
     rows = [template.frame_base[..., None], template.frame_jacobian[..., template.public]]
     return np.concatenate(rows, axis=-1)
+
+
+def slack_rows(template: AffineTemplate) -> NDArray[np.float64]:
+    """By how much `offered_rows` may differ between parts that move alike: 0 but for `ALIKE` where
+    what follows a parameter may have been added to its column, and taken off the constant."""
+    leaders = [p.name for p in template.parameters if not p.nuisance]
+    follows = np.array([[p.follows == name for name in leaders] for p in template.parameters])
+    touched = (template.frame_jacobian != 0.0) @ follows
+    return ALIKE * np.concatenate([touched.any(axis=-1, keepdims=True), touched], axis=-1)
 
 
 def hub_parts(template: AffineTemplate) -> NDArray[np.bool_]:
@@ -60,21 +74,24 @@ def _signs() -> list[NDArray[np.float64]]:
     return [np.reshape(sign, (3, 1, 1)) for sign in product((1.0, -1.0), repeat=3)]
 
 
-def _alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether two frames ``[3, 4, 1 + p]`` put a box in the same place, whichever way its axes
-    point."""
-    sides = zip(one[:, :3].swapaxes(0, 1), other[:, :3].swapaxes(0, 1), strict=True)
-    same = all(np.array_equal(a, b) or np.array_equal(a, -b) for a, b in sides)
-    return same and np.array_equal(one[:, 3], other[:, 3])
+def _alike(one: NDArray[np.float64], other: NDArray[np.float64], room: NDArray[np.float64]) -> bool:
+    """Whether two frames ``[3, 4, 1 + p]`` put a box in the same place, but for some room,
+    whichever way its axes point."""
+
+    def near(a: NDArray[np.float64], b: NDArray[np.float64], k: int) -> bool:
+        return bool((np.abs(a[:, k] - b[:, k]) <= room[:, k]).all())
+
+    same = all(near(one, other, k) or near(one, -other, k) for k in range(3))
+    return same and near(one, other, 3)
 
 
-def _partners(frames: NDArray[np.float64]) -> dict[int, tuple[int, ...]]:
+def _partners(frames: NDArray[np.float64], room: NDArray[np.float64]) -> dict[int, tuple[int, ...]]:
     partners: dict[int, tuple[int, ...]] = {}
     for axis in range(3):
         sign = np.ones((3, 1, 1))
         sign[axis] = -1.0
         images = [
-            next((j for j, f in enumerate(frames) if _alike(sign * frame, f)), -1)
+            next((j for j, f in enumerate(frames) if _alike(sign * frame, f, room)), -1)
             for frame in frames
         ]
         if len(frames) > 1 and all(j >= 0 and j != i for i, j in enumerate(images)):

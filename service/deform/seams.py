@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from service.deform.groups import offered_rows
+from service.deform.groups import offered_rows, slack_rows
 from service.deform.proximity import Boxes
 from service.deform.spinefit import Spine
 from service.template.affine import AffineTemplate
@@ -61,7 +61,7 @@ def flush_seams(template: AffineTemplate, boxes: Boxes, spines: dict[int, Spine]
     """
     affine = offered_rows(template)
     frames, rounded = boxes.frames, boxes.rounded
-    flush = _flush(affine)
+    flush = _flush(affine, slack_rows(template).max(axis=2))
     low, high = np.full((len(frames), 3), -0.5), np.full((len(frames), 3), 0.5)
     for part, axis in np.ndindex(len(frames), 3):
         row = affine[part, axis]
@@ -83,12 +83,14 @@ def flush_seams(template: AffineTemplate, boxes: Boxes, spines: dict[int, Spine]
     return Seams(low.astype(np.float32), high.astype(np.float32))
 
 
-def _flush(affine: Array) -> Mask:
+def _flush(affine: Array, slack: Array) -> Mask:
     """``[2, 3, P, P]`` whether two parts, whose rows ``[P, 3, 4, 1 + d]`` are given, have their
-    faces of a side and an axis in one place."""
+    faces of a side and an axis in one place, but for a slack of ``[P, 3, 1 + d]``."""
     half = 0.5 * np.abs(np.diagonal(affine[:, :, :3], axis1=1, axis2=2)).transpose(0, 2, 1)
     faces = np.stack([affine[:, :, 3] + side * half for side in SIDES]).swapaxes(1, 2)
-    return np.asarray(np.isclose(faces[:, :, :, None], faces[:, :, None]).all(axis=-1))
+    apart = np.abs(faces[:, :, :, None] - faces[:, :, None])
+    room = np.maximum(slack[:, None], slack[None]).transpose(2, 0, 1, 3)
+    return np.asarray((apart <= room + 1e-9).all(axis=-1))
 
 
 def _inner_face(frame: Array, axis: int, side: float, run: int, spine: Spine | None) -> Array:
