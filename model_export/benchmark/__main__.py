@@ -88,7 +88,7 @@ FULL = Plan(
     turns=24,
     many=True,
     bodies=12,
-    recovered=(1000, 50),
+    recovered=(300, 50),
 )
 QUICK = Plan(
     2, 1, 2, 2, sliders=1, checked=1, robust=1, turns=4, many=False, bodies=2, recovered=(50, 4)
