@@ -28,8 +28,8 @@ distance of vertices (V2V).  About the true joint, weights alone differ."""
 POSED = """Characters that come in several poses with one order of vertices, each brought to the
 pose that was fitted to another: V2V to that file's own vertices, errors of both fits included."""
 UNLIKE = """What the paper shows of bodies unlike its training's, single joints turned by 30 degrees
-either way: no truth is known.  Crossings are new pairs of faces against the input, and most are of
-skin that folds at a joint, or of clothes that slide on it."""
+either way: no truth is known.  Crossings are new pairs of faces against the input; skin that folds
+at a joint and clothes that slide on it count too."""
 
 
 def body_section(model: Model, count: int, folder: Path | None, say: Callable[[str], None]) -> str:
