@@ -139,16 +139,20 @@ class _Following:
             to_group: ``[n, G]`` distances to the groups.
             shares: ``[n, P]`` of the parts in their groups.
         """
-        if self.rims:
-            u = u.copy(order="K")
-        held = [(rim, *rim.hold(u, piece)) for rim in self.rims]
-        local, gains = saturate(u, self.limits, self.reach)
-        for rim, rows, slope in held:
-            gains[rows, rim.part, rim.axis] *= slope
+        u = u.copy(order="K")
+        slopes = [(rim, *rim.hold(u, piece)) for rim in self.rims]
         votes, present = self.votes, np.flatnonzero(np.bincount(piece))
-        for part, axis in np.argwhere((votes.keep[present] < 1.0).any(axis=0)):
-            keep, anchor = (m[:, part, axis][piece] for m in (votes.keep, votes.anchor))
-            local[:, part, axis] = anchor + keep * (local[:, part, axis] - anchor)
+        as_is = (votes.keep[present] == 1.0) & (votes.shift[present] == 0.0)
+        placed = [
+            (part, axis, votes.keep[:, part, axis][piece], votes.shift[:, part, axis][piece])
+            for part, axis in np.argwhere(~as_is.all(axis=0)).tolist()
+        ]
+        for part, axis, keep, shift in placed:
+            u[:, part, axis] = keep * u[:, part, axis] + shift
+        local, gains = saturate(u, self.limits, self.reach)
+        for rim, rows, slope in slopes:
+            gains[rows, rim.part, rim.axis] *= slope
+        for part, axis, keep, _ in placed:
             gains[:, part, axis] *= keep
         free = ~votes.whole[piece]
         if free.any():

@@ -56,9 +56,10 @@ def offered_rows(template: AffineTemplate) -> NDArray[np.float64]:
 def slack_rows(template: AffineTemplate) -> NDArray[np.float64]:
     """By how much `offered_rows` may differ between parts that move alike: 0 but for `ALIKE` where
     what follows a parameter may have been added to its column, and taken off the constant."""
-    leaders = [p.name for p in template.parameters if not p.nuisance]
-    follows = np.array([[p.follows == name for name in leaders] for p in template.parameters])
-    touched = (template.frame_jacobian != 0.0) @ follows
+    alone = np.zeros(len(template.parameters), bool)
+    guides = [p.follows for p in template.parameters]
+    leaders = np.array([alone if guide is None else guide.leaders for guide in guides])
+    touched = (template.frame_jacobian != 0.0) @ leaders[:, template.public]
     return ALIKE * np.concatenate([touched.any(axis=-1, keepdims=True), touched], axis=-1)
 
 

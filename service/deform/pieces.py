@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from service.deform.assemblies import Assemblies, hung, joined
 from service.deform.choice import CARRIED, TOUCH, Cases, choose, mean_distance, realised
 from service.deform.groups import Group
+from service.deform.margins import FAR, anchor, margins, part_ends, passage
 from service.deform.proximity import Boxes
+from service.deform.thickness import set_upright, thickness
 from service.deform.weld import runs
 
 Array32 = NDArray[np.float32]
@@ -26,8 +28,6 @@ Mask = NDArray[np.bool_]
 STRETCHED = 0.7
 # The same for a rod along its own axis, such as a spindle, which is held at both ends.
 ROD = (0.1, 0.2)
-# Beyond any unit coordinate.
-FAR = 1e9
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,15 @@ class Votes:
     Attributes:
         shares: ``[pieces, G]`` shares of the groups, one in sum, of a piece that moves as one;
             NaN for a piece that is left to its vertices.
-        keep: ``[pieces, P, 3]`` 1 where a piece stretches with a part, 0 where it is carried.
-        anchor: ``[pieces, P, 3]`` unit coordinates at which it is carried.
+        keep: ``[pieces, P, 3]`` 1 where a piece stretches with a part, 0 where it is carried, and
+            more where it stretches between margins.
+        shift: ``[pieces, P, 3]`` what unit coordinates times that are moved by; where a piece is
+            carried, the place.
     """
 
     shares: Array32
     keep: Array32
-    anchor: Array32
+    shift: Array32
 
     @property
     def whole(self) -> Mask:
@@ -95,28 +97,24 @@ def vote(
     skin &= ~(hubs & joined(hanging & ~skin[:, :, None], high - low, touching, thin))
     assembled = Assemblies(hanging & ~skin[:, :, None] & ~thin, touching)
     low, high = assembled.extents(low, high)
-    keep = np.where(rods, _stretch(high - low, *ROD), _stretch(high - low, CARRIED, STRETCHED))
-    # Where a piece makes up the part, it is as thick as the part; else it is carried at the spot
-    # nearest the part's middle where it touches.
-    keep = np.where(thin, made[:, :, None], keep)
-    keep[skin | np.isnan(shares[:, :1])] = 1.0
+    keep = np.where(rods, passage(high - low, *ROD), passage(high - low, CARRIED, STRETCHED))
+    ends = part_ends(low, high, made & member & ~boxes.rounded)
+    slope, start = margins(low, high, ends)
+    # What hangs from a round hub goes with its own middle, whatever it is flush with.
+    middle = np.clip((low + high) / 2, -0.5, 0.5)
+    place = np.where((hubs & boxes.rounded)[:, None], middle, anchor(low, high, ends))
+    shift = (1.0 - keep) * place + keep * start
+    keep *= slope
+    low, high = set_upright(u, order, starts, low, high, boxes)
     carried = member & ~made & ~skin & boxes.rounded
     together = Assemblies(carried[:, :, None] & thin, touching)
-    contact = np.clip(together.contacts(touch_low, touch_high, nearest), -0.5, 0.5)
-    place = np.where((hubs & boxes.rounded)[:, None], _middle(low, high), _anchor(low, high))
-    anchor = np.where(thin & ~made[:, :, None], contact, place)
-    return Votes(shares, keep.astype(np.float32), anchor.astype(np.float32))
-
-
-def _middle(low: Array32, high: Array32) -> Array32:
-    return np.clip((low + high) / 2, -0.5, 0.5)
-
-
-def _anchor(low: Array32, high: Array32) -> Array32:
-    """``[pieces, P, 3]`` where along a part a piece is carried: at its side where it is flush."""
-    center, half = (low + high) / 2, np.minimum((high - low) / 2, 0.45)
-    flush = np.clip(center / (np.float32(0.5) - half), -1.0, 1.0)
-    return np.where(high - low < 1.0, flush * 0.5, np.clip(center, -0.5, 0.5))
+    contact = together.contacts(touch_low, touch_high, nearest)
+    own, across = thickness(low, high, made, member, contact)
+    keep = np.where(thin, own, keep)
+    shift = np.where(thin, across, shift)
+    left = skin | np.isnan(shares[:, :1])
+    keep[left], shift[left] = 1.0, 0.0
+    return Votes(shares, keep.astype(np.float32), shift.astype(np.float32))
 
 
 def _skin(cost: Array32, groups: list[Group], boxes: Boxes) -> Mask:
@@ -150,11 +148,6 @@ def _extents(u: Array32, order: Index, starts: Index, far: Mask) -> tuple[Array3
             near[0, :, part, axis] = np.minimum.reduceat(own + beyond, starts)
             near[1, :, part, axis] = np.maximum.reduceat(own - beyond, starts)
     return whole, near
-
-
-def _stretch(fill: Array32, carried: float, stretched: float) -> Array32:
-    s = np.clip((fill - carried) / (stretched - carried), 0.0, 1.0)
-    return s * s * (3.0 - 2.0 * s)
 
 
 def _elongated(extent: Array32) -> Mask:

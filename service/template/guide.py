@@ -31,6 +31,11 @@ class Guide:
     between: Array
     moves: Array
 
+    @property
+    def leaders(self) -> NDArray[np.bool_]:
+        """``[d]`` the parameters that it may follow."""
+        return np.asarray(self.moves[:, 1:].any(axis=0))
+
     def row(self, f: Array) -> Array:
         """``[d]`` changes of the parameter for a unit of each, from ``f [d]`` on."""
         at = np.concatenate([[1.0], f])

@@ -45,8 +45,11 @@ def test_a_rail_goes_with_the_legs_and_a_cushion_with_the_seat():
     assert result.shares[lowest].tolist() == [0, 0, 1]
     assert result.shares[1 - lowest].tolist() == [1, 0, 0]
     # The cushion lies on the seat: it is lifted with the top, not thickened.
-    assert result.keep[1 - lowest, 0].tolist() == [1, 0, 1]
-    assert result.anchor[1 - lowest, 0, 1] == 0.5
+    keep, shift = result.keep[1 - lowest, 0], result.shift[1 - lowest, 0]
+    assert (keep[1], shift[1]) == (0.0, 0.5)
+    # It keeps its margins: its ends go with the seat's.
+    u = np.array([-0.18, 0.18]) / W
+    np.testing.assert_allclose(keep[0] * u + shift[0], [-0.5, 0.5], atol=1e-5)
 
 
 def test_a_spindle_is_stretched_along_itself_and_a_slat_is_carried_up():
@@ -59,13 +62,51 @@ def test_a_spindle_is_stretched_along_itself_and_a_slat_is_carried_up():
     assert result.keep[1 - upper, 1, :2].tolist() == [1, 0]
 
 
+def test_a_bar_between_posts_goes_where_they_go():
+    z = PARAMETERS[1] / 2 - D / 2
+    posts = [block((x - 0.015, 0.03, z - 0.02), (x + 0.015, 0.5, z + 0.02)) for x in (-0.21, 0.21)]
+    bar = block((-0.19, 0.4, z - 0.02), (0.19, 0.44, z + 0.02))
+    welded, result = votes(*posts, bar)
+    low, high = welded.boxes()
+    n = int((high - low)[:, 0].argmax())
+    ends = result.keep[n, 1, 0] * np.array([-0.19, 0.19]) / W + result.shift[n, 1, 0]
+    for side, end in ((-1, ends[0]), (1, ends[1])):
+        post = int((side * low[:, 0]).argmax())
+        assert result.keep[post, 1, 0] == 0.0
+        np.testing.assert_allclose(end, result.shift[post, 1, 0], atol=1e-5)
+
+
+def test_posts_thicken_with_the_back_and_spindles_do_not():
+    thick = PARAMETERS[1]
+    z = thick / 2 - D / 2
+    post = block((-0.2, 0.03, z - thick / 2), (-0.17, 0.5, z + thick / 2))
+    spindle = block((-0.01, 0.03, z - thick / 8), (0.01, 0.5, z + thick / 8))
+    welded, result = votes(post, spindle)
+    first = int(welded.boxes()[0][:, 0].argmin())
+    assert result.keep[first, 1, 2] == 1.0
+    assert result.keep[1 - first, 1, 2] == 0.0
+    assert abs(result.shift[1 - first, 1, 2]) < 1e-5
+
+
+def test_a_leaning_cushion_is_in_front_of_the_back_it_touches():
+    thick = PARAMETERS[1]
+    front = thick - D / 2
+    panel = block((-W / 2, 0.03, front - thick), (W / 2, 0.5, front))
+    points, faces = block((-0.18, 0.06, front), (0.18, 0.44, front + 0.05))
+    points[:, 2] += 0.3 * (points[:, 1] - 0.25)
+    welded, result = votes(panel, (points, faces))
+    cushion = int(welded.boxes()[0][:, 0].argmax())
+    assert result.keep[1 - cushion, 1, 2] == 1.0
+    assert (result.keep[cushion, 1, 2], result.shift[cushion, 1, 2]) == (0.0, 0.5)
+
+
 def test_touching_pieces_are_carried_together():
     spoke = block((-0.2, -0.40, -0.02), (0.2, -0.36, 0.02))
     castor = block((-0.21, -0.43, -0.01), (-0.16, -0.39, 0.01))
     _, apart = votes(block((-0.2, -0.30, -0.02), (0.2, -0.26, 0.02)), castor)
     _, result = votes(spoke, castor)
-    np.testing.assert_array_equal(result.anchor[0, 2, 1], result.anchor[1, 2, 1])
-    assert apart.anchor[0, 2, 1] != apart.anchor[1, 2, 1]
+    np.testing.assert_array_equal(result.shift[0, 2, 1], result.shift[1, 2, 1])
+    assert apart.shift[0, 2, 1] != apart.shift[1, 2, 1]
 
 
 def test_a_flap_stretches_with_the_wing_and_an_engine_is_carried():
@@ -102,8 +143,8 @@ def test_a_gears_leg_and_wheel_go_with_the_spot_where_the_leg_is_fixed():
     upper = welded.boxes()[0][:, 1].argmax()
     assert (result.shares[:, 0] == 1.0).all()
     np.testing.assert_array_equal(result.keep[:, 0], 0.0)
-    np.testing.assert_array_equal(result.anchor[0, 0], result.anchor[1, 0])
-    assert result.anchor[upper, 0, 1] > alone.anchor[0, 0, 1] == -0.5
+    np.testing.assert_array_equal(result.shift[0, 0], result.shift[1, 0])
+    assert result.shift[upper, 0, 1] > alone.shift[0, 0, 1] == -0.5
 
 
 def test_a_strut_in_the_belly_is_its_wheels_and_a_hatch_is_the_skins():
@@ -113,7 +154,7 @@ def test_a_strut_in_the_belly_is_its_wheels_and_a_hatch_is_the_skins():
     np.testing.assert_array_equal(hatch.keep[0, 0], 1.0)
     _, result = hanging(strut, wheel)
     np.testing.assert_array_equal(result.keep[:, 0], 0.0)
-    np.testing.assert_array_equal(result.anchor[0, 0], result.anchor[1, 0])
+    np.testing.assert_array_equal(result.shift[0, 0], result.shift[1, 0])
 
 
 def test_a_wheel_goes_with_its_leg_on_the_wing():

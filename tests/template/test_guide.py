@@ -45,6 +45,12 @@ def test_another_may_move_by_the_same_place() -> None:
     assert row(entry, 2.0, "slant") == [0.0, -0.1, 0.0, 0.0]
 
 
+def test_it_says_what_may_lead() -> None:
+    entry = {"at": "sail", "between": BETWEEN, "moves": [0, 0, "-0.4 * mast"]}
+    assert read_guide("slant", entry, NAMES, PUBLIC).leaders.tolist() == [False, True, False, False]
+    assert read_guide("sail", "body", NAMES, PUBLIC).leaders.tolist() == [True, False, False, False]
+
+
 def test_places_that_fall_together_are_no_division_by_zero() -> None:
     guide = read_guide("sail", {"between": BETWEEN}, NAMES, PUBLIC)
     assert np.isfinite(guide.row(np.zeros(4))).all()
