@@ -1,4 +1,4 @@
-"""Draw fits and edits of real shapes.
+"""Draw fits of real shapes.
 
 ``python -m model_export.contact_sheet chair --realistic DIR``
 """
@@ -6,20 +6,17 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from model_export.config import SHIPPED
-from model_export.pictures import BLUE, GREY, YELLOW, Panel, save_sheet
+from model_export.pictures import BLUE, YELLOW, Panel, save_sheet
 from model_export.realistic import RealisticShape, find_shapes
-from service.edits import Change
 from service.encode.model import Model, load_models
 from service.inference import Inference
-from service.mesh.formats import read_mesh
-from service.pipeline import edit, infer
-from service.requests import EditOptions, InferOptions, Upload
+from service.pipeline import infer
+from service.requests import InferOptions, Upload
 
 UPRIGHT = InferOptions(up="+y", front="+z")
 
@@ -39,27 +36,6 @@ def fit_panel(model: Model, shape: RealisticShape) -> Panel:
     )
 
 
-def edit_panels(model: Model, shape: RealisticShape, factors: Sequence[float]) -> list[Panel]:
-    """A real shape and its edits: each parameter times each factor."""
-    found = _infer(model, shape)
-    mesh = found.mesh
-    panels: list[Panel] = []
-    for factor in factors:
-        panels.append(Panel(shape.name[:30], [(mesh.vertices, mesh.faces, YELLOW, 1.0)]))
-        for name in public_names(model):
-            change = {name: Change("scale", factor)}
-            edited = edit(found.upload, {model.name: model}, UPRIGHT, change, EditOptions())
-            moved = read_mesh(edited.data, found.upload.name)
-            title = f"{name} x {factor:g}"
-            panels.append(Panel(title, [(moved.vertices, moved.faces, GREY, 1.0)]))
-    return panels
-
-
-def public_names(model: Model) -> list[str]:
-    """The parameters that an edit may name."""
-    return [parameter.name for parameter in model.template.parameters if not parameter.nuisance]
-
-
 def _infer(model: Model, shape: RealisticShape) -> Inference:
     upload = Upload(shape.path.read_bytes(), shape.path.name)
     return infer(upload, {model.name: model}, UPRIGHT)
@@ -73,16 +49,10 @@ def main() -> None:
     parser.add_argument("--realistic", type=Path, required=True, help="folder of real meshes")
     parser.add_argument("--out", type=Path, default=Path("runs/sheet.png"), help="PNG to write")
     parser.add_argument("--count", type=int, default=20, help="held-out shapes to draw")
-    parser.add_argument("--shape", help="draw this shape's edits instead of fits")
     arguments = parser.parse_args()
     model = load_models(arguments.models or SHIPPED)[arguments.name]
     shapes = find_shapes(arguments.realistic)
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    if arguments.shape:
-        chosen = next(shape for shape in shapes if shape.name == arguments.shape)
-        panels = edit_panels(model, chosen, (0.7, 1.4))
-        save_sheet(panels, arguments.out, columns=1 + len(public_names(model)))
-        return
     held_out = [shape for shape in shapes if shape.held_out and shape.info.get("core", True)]
     order = np.random.default_rng(0).permutation(len(held_out))[: arguments.count]
     save_sheet([fit_panel(model, held_out[index]) for index in order], arguments.out)

@@ -114,7 +114,7 @@ class Subject:
         vertices = self._canonical(answer)
         away = np.linalg.norm(vertices - self.found.vertices, axis=1)
         notes = remarks(answer, changes) if away.max() > STILL else ["nothing moves"]
-        title = ", ".join([title, *notes])
+        title = (", " if len(changes) == 1 else "\n").join([title, *notes])
         faces = self.found.mesh.faces
         return Panel(title, [(vertices, faces, tinted(away, faces), 1.0)])
 
@@ -142,15 +142,16 @@ def tinted(away: Array, faces: Faces) -> Colour:
 
 def remarks(answer: Edited, changes: Mapping[str, Change]) -> list[str]:
     """What the picture alone would not tell: values that were not reached, and folds."""
-    notes, values = [], answer.report["parameters"] | answer.report["derived"]
+    notes: list[str] = []
+    values = answer.report["parameters"] | answer.report["derived"]
     for name, change in changes.items():
         before, after = values[name]["before"], values[name]["after"]
         asked = change.apply(before)
         if abs(after - asked) > REACHED * abs(asked):
-            reached = f"x {after / before:.2f}" if change.kind == "scale" else f"{after:.2f}"
-            notes.append(f"only {reached}")
-    if answer.report["flipped_faces"]:
-        notes.append(f"{answer.report['flipped_faces']} folds")
+            which = "" if len(changes) == 1 else f"{name} "
+            notes.append(f"only {which}x {after / before:.2f}")
+    if folds := answer.report["flipped_faces"]:
+        notes.append(f"{folds} fold{'s' * (folds > 1)}")
     return notes
 
 
