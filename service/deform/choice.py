@@ -24,6 +24,9 @@ CLEARLY = (1.25, 0.02)
 # mean square over and above what its vertices need: from a box, and from a part that is known to be
 # no box.
 BEYOND = (0.06, 0.02)
+# Share of a piece that is within a flat part which it makes up with others, and of a part's length
+# and breadth which one piece covers that lies at its side.
+SLIM, COVERS = 0.25, 0.7
 # Share of the part's length under which a piece is carried.
 CARRIED = 0.4
 # How near a strut's ends come to what it holds, and the share of a wing under which it is none.
@@ -35,7 +38,8 @@ class Cases:
     """What is known of the pieces.
 
     Attributes:
-        made: ``[pieces, P]`` the parts that a piece makes up.
+        made: ``[pieces, P]`` the parts that a piece makes up, some with others.
+        full: ``[pieces, P]`` those that it makes up by itself.
         nearest: ``[pieces, P]`` least distances to the parts.
         cost: ``[pieces, G]`` mean distances to the groups.
         free: ``[pieces, 1]`` mean of each vertex's distance to the group nearest to it.
@@ -44,6 +48,7 @@ class Cases:
     """
 
     made: Mask
+    full: Mask
     nearest: Array32
     cost: Array32
     free: Array32
@@ -63,6 +68,11 @@ def choose(cases: Cases, groups: list[Group], boxes: Boxes, hubs: Mask) -> Array
     apart = np.array([len(g.members) > 1 and not boxes.end_to_end(g) for g in groups])
     spans = np.stack([(cases.nearest[:, m] < TOUCH).sum(axis=1) > 1 for m in members], axis=1)
     spans &= apart
+    # A template's arm may be a box from the top of an armrest to below the seat: what is in it and
+    # reaches from leg to leg is a rail.
+    solid = np.array([cases.full[:, m].any() for m in members])
+    spans &= solid | ~(spans & solid).any(axis=1, keepdims=True)
+    makes &= solid | ~apart | ~(spans & solid).any(axis=1, keepdims=True)
     # A piece that makes up a part goes with that part, one from leg to leg with the legs, others
     # with what is clearly nearest.
     chosen = _clearly_nearest(cases, groups, boxes, hubs)
@@ -134,15 +144,30 @@ def _bridged(cases: Cases, groups: list[Group], boxes: Boxes, hubs: Mask) -> Mas
     return bridged
 
 
-def realised(low: Array32, high: Array32, boxes: Boxes) -> Mask:
-    """``[pieces, P]`` whether what lies inside a part runs along it and through its middle."""
+def realised(low: Array32, high: Array32, extent: Array32, boxes: Boxes) -> tuple[Mask, Mask]:
+    """``[pieces, P]`` whether what lies inside a part runs along it and through its middle, and
+    whether it does so along all of it.
+
+    Args:
+        low, high: ``[pieces, P, 3]`` ends of what touches a part.
+        extent: ``[pieces, P, 3]`` sizes of the pieces.
+        boxes: of the parts.
+    """
     thin = boxes.thin
     inside = np.clip(high, -0.5, 0.5) - np.clip(low, -0.5, 0.5)
     along = (inside >= 0.5) & boxes.long
     # Not beside the part, as a seat is below a back.
     within = ((inside >= 0.3 * (high - low)) & (np.abs(low + high) < 0.999)) | thin
     centered = (np.abs(low + high) <= 0.7) | (high - low >= 0.6) | ~thin
-    return along.any(axis=2) & (centered & within).all(axis=2)
+    made = along.any(axis=2) & (centered & within).all(axis=2)
+    full = (along | ~boxes.long).all(axis=2)
+    # A seat runs along the arms beside it, and is none.
+    flat = boxes.long.sum(axis=1) > 1
+    slim = ((inside >= SLIM * extent) | ~thin).all(axis=2)
+    made &= full | slim | ~flat
+    # What covers all of a flat part is of it, be it a board at its lower side.
+    made |= flat & ((inside >= COVERS) | thin).all(axis=2)
+    return made, made & full
 
 
 def mean_distance(distance: Array32, starts: Index) -> Array32:

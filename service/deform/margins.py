@@ -23,15 +23,17 @@ def passage(fill: Array32, carried: float, stretched: float) -> Array32:
     return s * s * (3.0 - 2.0 * s)
 
 
-def part_ends(low: Array32, high: Array32, made: Mask) -> Array32:
-    """``[2, P, 3]`` where parts end, as the pieces have it that make them up.
+def part_ends(low: Array32, high: Array32, member: Mask) -> Array32:
+    """``[2, P, 3]`` where parts end, as the pieces have it that follow them and lie in them.
 
     Args:
         low, high: ``[pieces, P, 3]`` ends of the pieces in unit coordinates.
-        made: ``[pieces, P]``.
+        member: ``[pieces, P]`` the parts that a piece follows.
     """
-    bottom = np.where(made[:, :, None], low, FAR).min(axis=0)
-    top = np.where(made[:, :, None], high, -FAR).max(axis=0)
+    inside = np.clip(high, -0.5, 0.5) - np.clip(low, -0.5, 0.5)
+    within = member[:, :, None] & (inside >= 0.5 * (high - low))
+    bottom = np.where(within, low, FAR).min(axis=0)
+    top = np.where(within, high, -FAR).max(axis=0)
     known = top - bottom > 1.0 - 2 * OFF
     ends = np.where(known, [bottom, top], np.array([-0.5, 0.5])[:, None, None])
     return np.clip(ends, [[[-0.5 - OFF]], [[0.5 - OFF]]], [[[OFF - 0.5]], [[0.5 + OFF]]])

@@ -83,10 +83,11 @@ def vote(
     nearest = np.minimum.reduceat(distances, starts, axis=1).T
     far = distances > np.repeat(nearest.T, counts, axis=1) + np.float32(TOUCH)
     (low, high), (touch_low, touch_high) = _extents(u, order, starts, far)
-    made = np.asarray(nearest < TOUCH) & realised(touch_low, touch_high, boxes)
+    made, full = realised(touch_low, touch_high, high - low, boxes)
+    made &= nearest < TOUCH
     cost = mean_distance(to_group, starts)
     free = mean_distance(to_group.min(axis=0, keepdims=True), starts)
-    cases = Cases(made, nearest, cost, free, high - low, touching)
+    cases = Cases(made, full & made, nearest, cost, free, high - low, touching)
     shares = hung(choose(cases, groups, boxes, hubs), nearest.min(axis=1), high - low, touching)
     rods = _elongated((high - low) * boxes.sizes.astype(np.float32))
     # Nothing holds the tip of a propeller's blade, off the wing, as a spindle's ends are held.
@@ -98,7 +99,13 @@ def vote(
     assembled = Assemblies(hanging & ~skin[:, :, None] & ~thin, touching)
     low, high = assembled.extents(low, high)
     keep = np.where(rods, passage(high - low, *ROD), passage(high - low, CARRIED, STRETCHED))
-    ends = part_ends(low, high, made & member & ~boxes.rounded)
+    # Timbers that run on into other parts show where this one ends, not by how much it is longer.
+    split = (np.isnan(shares[:, :1]) & (nearest < TOUCH))[:, :, None]
+    ends = part_ends(
+        np.where(split, np.clip(touch_low, -0.5, 0.5), low),
+        np.where(split, np.clip(touch_high, -0.5, 0.5), high),
+        (member | split[:, :, 0]) & ~boxes.rounded,
+    )
     slope, start = margins(low, high, ends)
     # What hangs from a round hub goes with its own middle, whatever it is flush with.
     middle = np.clip((low + high) / 2, -0.5, 0.5)
@@ -108,7 +115,8 @@ def vote(
     low, high = set_upright(u, order, starts, low, high, boxes)
     carried = member & ~made & ~skin & boxes.rounded
     together = Assemblies(carried[:, :, None] & thin, touching)
-    contact = together.contacts(touch_low, touch_high, nearest)
+    near = np.maximum(touch_low, low), np.minimum(touch_high, high)
+    contact = together.contacts(*near, nearest)
     own, across = thickness(low, high, made, member, contact)
     keep = np.where(thin, own, keep)
     shift = np.where(thin, across, shift)

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 from ballots import votes_of
 from boxes import ORIGIN, block, joined
+from numpy.typing import NDArray
 from planes import VALUES, of_part, on_wing, plane, plane_mesh, plane_values
+
+from service.deform.groups import mirror_groups
+from service.template.loader import load_template
 
 
 def placed(at: np.ndarray, size: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -72,3 +76,40 @@ def test_the_rings_of_an_engine_beside_the_wings_root_go_together():
     assert chosen(front) == [0, 1, 0, 0]
     _, result = votes_of(plane(), plane_values(), joined(ring, front))
     assert result.shares.tolist() == [[1, 0, 0, 0], [1, 0, 0, 0]]
+
+
+def armchair_votes(*meshes: tuple[np.ndarray, np.ndarray]) -> tuple[list[str], NDArray[np.float32]]:
+    """Names of the groups of an armchair whose arms are boxes down to below the seat, and the
+    shares of pieces in the order of their heights."""
+    template = next(t for t in load_template("chair").variants if t.variant == "armchair")
+    f = template.vector(
+        {"back_height": 0.5, "back_thickness": 0.04, "seat_thickness": 0.05, "seat_depth": 0.45,
+         "seat_width": 0.42, "leg_height": 0.4, "leg_depth": 0.04, "leg_width": 0.05,
+         "arm_height": 0.2, "arm_thickness": 0.3, "arm_width": 0.05, "arm_gap": -0.025,
+         "arm_length": 0.4, "leg_inset": 0.0}
+    )  # fmt: skip
+    welded, result = votes_of(template, f, joined(*meshes))
+    low, high = welded.boxes()
+    names = [template.parts[g.members[0]] for g in mirror_groups(template)]
+    return names, result.shares[np.argsort((low + high)[:, 1])]
+
+
+def test_what_is_in_a_tall_arm_and_reaches_from_leg_to_leg_goes_with_the_legs():
+    legs = [
+        block((x - 0.025, -0.425, z - 0.02), (x + 0.025, -0.025, z + 0.02))
+        for x in (-0.185, 0.185)
+        for z in (-0.2, 0.2)
+    ]
+    rail = block((-0.2, -0.07, -0.2), (-0.18, -0.03, 0.2))
+    seat = block((-0.21, -0.024, -0.225), (0.21, 0.025, 0.225))
+    rest = block((-0.21, 0.2, -0.2), (-0.17, 0.225, 0.19))
+    names, shares = armchair_votes(*legs, rail, seat, rest)
+    found = [names[int(row.argmax())] for row in shares]
+    assert np.isfinite(shares).all()
+    assert found == ["front_right_leg"] * 5 + ["seat", "right_arm"]
+
+
+def test_a_board_at_the_underside_of_a_thick_seat_is_the_seat():
+    board = block((-0.21, -0.05, -0.225), (0.21, -0.03, 0.225))
+    names, shares = armchair_votes(board)
+    assert shares[0].tolist() == np.eye(len(names))[names.index("seat")].tolist()

@@ -39,13 +39,13 @@ def test_a_timber_from_floor_to_top_is_left_to_its_vertices():
 
 def test_a_rail_goes_with_the_legs_and_a_cushion_with_the_seat():
     rail = block((-W / 2 + 0.02, -0.3, D / 2 - 0.03), (W / 2 - 0.02, -0.28, D / 2 - 0.01))
+    seat = block((-W / 2, -0.025, -D / 2), (W / 2, 0.025, D / 2))
     cushion = block((-0.18, 0.026, -0.15), (0.18, 0.09, 0.2))
-    welded, result = votes(rail, cushion)
-    lowest = welded.boxes()[0][:, 1].argmin()
-    assert result.shares[lowest].tolist() == [0, 0, 1]
-    assert result.shares[1 - lowest].tolist() == [1, 0, 0]
+    welded, result = votes(rail, seat, cushion)
+    lowest, middle, top = np.argsort(welded.boxes()[0][:, 1])
+    assert result.shares[[lowest, middle, top]].tolist() == [[0, 0, 1], [1, 0, 0], [1, 0, 0]]
     # The cushion lies on the seat: it is lifted with the top, not thickened.
-    keep, shift = result.keep[1 - lowest, 0], result.shift[1 - lowest, 0]
+    keep, shift = result.keep[top, 0], result.shift[top, 0]
     assert (keep[1], shift[1]) == (0.0, 0.5)
     # It keeps its margins: its ends go with the seat's.
     u = np.array([-0.18, 0.18]) / W
@@ -74,6 +74,19 @@ def test_a_bar_between_posts_goes_where_they_go():
         post = int((side * low[:, 0]).argmax())
         assert result.keep[post, 1, 0] == 0.0
         np.testing.assert_allclose(end, result.shift[post, 1, 0], atol=1e-5)
+
+
+def test_a_bar_between_timbers_goes_where_they_go():
+    z = PARAMETERS[1] / 2 - D / 2
+    timbers = [
+        block((x - 0.015, -0.42, z - 0.02), (x + 0.015, 0.5, z + 0.02)) for x in (-0.195, 0.195)
+    ]
+    bar = block((-0.18, 0.4, z - 0.02), (0.18, 0.44, z + 0.02))
+    welded, result = votes(*timbers, bar)
+    low, high = welded.boxes()
+    n = int((high - low)[:, 0].argmax())
+    ends = result.keep[n, 1, 0] * np.array([-0.18, 0.18]) / W + result.shift[n, 1, 0]
+    np.testing.assert_allclose(ends, [-0.5, 0.5], atol=1e-5)
 
 
 def test_posts_thicken_with_the_back_and_spindles_do_not():
