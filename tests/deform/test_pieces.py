@@ -106,11 +106,12 @@ def test_a_leaning_cushion_is_in_front_of_the_back_it_touches():
     front = thick - D / 2
     panel = block((-W / 2, 0.03, front - thick), (W / 2, 0.5, front))
     points, faces = block((-0.18, 0.06, front), (0.18, 0.44, front + 0.05))
-    points[:, 2] += 0.3 * (points[:, 1] - 0.25)
+    points[:, 2] += 0.3 * (points[:, 1] - points[:, 1].mean())
     welded, result = votes(panel, (points, faces))
     cushion = int(welded.boxes()[0][:, 0].argmax())
     assert result.keep[1 - cushion, 1, 2] == 1.0
-    assert (result.keep[cushion, 1, 2], result.shift[cushion, 1, 2]) == (0.0, 0.5)
+    assert result.keep[cushion, 1, 2] == 0.0
+    assert abs(result.shift[cushion, 1, 2] - 0.5) < 1e-3
 
 
 def test_touching_pieces_are_carried_together():
