@@ -111,7 +111,7 @@ def test_a_leaning_cushion_is_in_front_of_the_back_it_touches():
     cushion = int(welded.boxes()[0][:, 0].argmax())
     assert result.keep[1 - cushion, 1, 2] == 1.0
     assert result.keep[cushion, 1, 2] == 0.0
-    assert abs(result.shift[cushion, 1, 2] - 0.5) < 1e-3
+    assert abs(result.shift[cushion, 1, 2] - 0.5) < 5e-3
 
 
 def test_touching_pieces_are_carried_together():
