@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,8 +122,8 @@ def _warnings(found: AffineInference, outcome: Outcome) -> list[str]:
     ]
     warnings += [
         f"{text} is now negative: parts may run into each other"
-        for text in template.broken_relations(after)
-        if text not in held
+        for text in compress(template.relation_texts, template.limiting.tolist())
+        if text in template.broken_relations(after) and text not in held
     ]
     warnings += [
         f"{name} is outside of what the model was trained on, for the rest of the shape"

@@ -1,8 +1,9 @@
 """How far an edit may go: hard limits and relations hold it back, soft limits are told of.
 
-Hard are that sizes stay positive and that the template's relations, kept before the edit, are kept
-after it.  What breaks one is moved to the nearest values that break none.  Soft is the template's
-ranges: outside of them shapes are edited just so, but no model has seen any.
+Hard are that sizes stay positive and that the template's relations of parts (see
+`AffineTemplate.limiting`), kept before the edit, are kept after it.  What breaks one is moved to
+the nearest values that break none.  Soft is the template's ranges: outside of them shapes are
+edited just so, but no model has seen any.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Bounds:
         sizes = np.flatnonzero(~template.signed)
         relations, terms = template.relations, template.relations[:, 1:] * before
         margin = relations[:, 0] + terms.sum(axis=1)
-        bound = np.flatnonzero(margin > SLACK * np.abs(terms).sum(axis=1))
+        bound = np.flatnonzero((margin > SLACK * np.abs(terms).sum(axis=1)) & template.limiting)
         return cls(
             rows=np.concatenate([np.eye(len(before))[sizes], relations[bound, 1:]]),
             constants=np.concatenate([-np.minimum(before[sizes], least), relations[bound, 0]]),

@@ -192,6 +192,17 @@ class AffineTemplate:
             text for text, is_kept in zip(self.relation_texts, kept, strict=True) if not is_kept
         ]
 
+    @cached_property
+    def limiting(self) -> NDArray[np.bool_]:
+        """``[r]`` the relations that say something of the parts' maps, which move a mesh.
+
+        The others are about sections that swell or shift: they tell which shapes there are, and a
+        mesh has its own sections, which an edit of its size keeps in proportion.
+        """
+        maps = np.concatenate([self.frame_jacobian, self.taper_jacobian], axis=2)
+        shaping = self.active & ~np.asarray(maps.any(axis=(0, 1, 2)))
+        return ~np.asarray(self.relations[:, 1:][:, shaping].any(axis=1))
+
     def anchor(self, name: str) -> tuple[Array, Array]:
         """Constant ``[3]`` and Jacobian ``[3, d]`` of the point that an edit can hold in place."""
         rows = self.anchors[name]

@@ -223,3 +223,14 @@ def test_the_wing_span_is_the_widest_extent(airplane: AffineTemplate, f: np.ndar
     assert (span.extent, length.extent, height.extent) == ("x", "z", "y")
     for dimension in (span, length, height):
         assert all(airplane.public[index] for index in dimension.by)
+
+
+def test_sections_are_no_limit_to_an_edit(airplane: AffineTemplate) -> None:
+    told = {
+        text for text, own in zip(airplane.relation_texts, airplane.limiting, strict=True) if own
+    }
+    others = set(airplane.relation_texts) - told
+    assert "0.7 * fuselage_width - tail_end" in others
+    assert all("tail_" in text or "nose_" in text for text in others)
+    assert "wing_root_chord - wing_tip_chord" in told
+    assert "0.2 * fuselage_height - tail_rise" in told, "the fin stands on it"
