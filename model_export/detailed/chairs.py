@@ -2,7 +2,9 @@
 
 The truth is a carpenter's: a wider chair has a wider seat, cushion, apron and rails, while legs,
 posts and arms move apart and keep their thickness; stretchers lengthen, slats and spindles spread
-and keep their number and section; a leg's or a back's lean, as a distance, stays.
+and keep their number and section; a leg's or a back's lean, as a distance, stays.  Rounded edges
+keep their radius, and a leg without rails stretches evenly.  A thicker back has thicker posts,
+slats or panel, and the same spindles.  No true edit folds a face.
 """
 
 from __future__ import annotations
@@ -31,6 +33,8 @@ NAMES = (
     "seat_width", "leg_height", "leg_depth", "leg_width",
 )  # fmt: skip
 
+ROOM = 1.45
+"""How much of a welded seat's underside a leg has to grow into, over its width and depth."""
 ARM_HALF = (0.022, 0.014)
 """Half an arm's width and thickness,"""
 ARM_SHORT = 0.05
@@ -62,6 +66,7 @@ def detailed_chair(seed: int, density: int | None = None) -> DetailedChair:
     welded = seed % 3 == 2
     style = _style(rng)
     style.density = density or style.density
+    style.room = ROOM * parameters[[7, 6]]
     builder = _welded if welded else _assembled
 
     def build(p: SimpleNamespace) -> Mesh:
@@ -175,10 +180,10 @@ def _back_point(p: SimpleNamespace, s: SimpleNamespace, x: ArrayLike, up: ArrayL
 def _back(p: SimpleNamespace, s: SimpleNamespace) -> Iterator[Mesh]:
     thick = p.back_thickness
     if s.back == "panel":
-        center = (0, 0, 0)
-        flat, faces = slab(center, (p.seat_width, 2.0, thick), s.fillet, 2 * s.density)
+        size = (p.seat_width, p.back_height, thick)
+        flat, faces = slab((0, 0, 0), size, s.fillet, 2 * s.density)
         # The panel follows the back's lean and bow.
-        middle = _back_point(p, s, flat[:, 0], (flat[:, 1] + 1) / 2)
+        middle = _back_point(p, s, flat[:, 0], flat[:, 1] / p.back_height + 0.5)
         middle[:, 2] += flat[:, 2]
         yield middle, faces
     else:
@@ -252,12 +257,17 @@ def _welded(p: SimpleNamespace, s: SimpleNamespace) -> Mesh:
     x_cells = z_cells = [k, 2 * k, 4 * k, 2 * k, k]
     y_cells = [5 * k, k, 5 * k, k, k] + [3 * k, k] * s.slats
     rail = -st - p.leg_height * (1 - (s.stretcher or 0.4))
-    stops = [-st - p.leg_height, rail - 0.02, rail, -st - (s.apron or 0.05), -st, st]
+    # Where there are no rails, legs stretch evenly.
+    low = rail - (0.02 if s.stretcher else 0.05 * p.leg_height)
+    apron = s.apron or 0.12 * p.leg_height
+    stops = [-st - p.leg_height, low, rail, -st - apron, -st, st]
     up = (np.arange(s.slats)[:, None] + [0.6, 1.0]) / s.slats
     y = _lines([*stops, *(st + p.back_height * up.ravel())], y_cells)
     post, lw, ld = 0.03, p.leg_width, p.leg_depth
-    across = _columns(w, x_cells, [(lw, lw), (post, post), (post, post)])
-    along = _columns(d, z_cells, [(ld, ld), (post, post), (p.back_thickness, post)])
+    # At its underside the seat leaves room around the legs, so that thicker ones don't fold it.
+    under = s.room
+    across = _columns(w, x_cells, [(lw, lw), (under[0], under[0]), (post, post)])
+    along = _columns(d, z_cells, [(ld, ld), (under[1], under[1]), (p.back_thickness, post)])
     at = [np.repeat(np.arange(len(c)), c) for c in (x_cells, y_cells, z_cells)]
     nodes, faces = lattice_surface(_chair_cells(*np.meshgrid(*at, indexing="ij"), s))
     i, j, h = nodes.T
@@ -271,10 +281,10 @@ def _columns(half: float, cells: list[int], ends: list[tuple[float, float]]) -> 
     """Lattice lines of the three levels between ``-half`` and ``half``, which have columns of
     widths `ends` at their sides.
 
-    Quarter lines hold the seat's middle still when a leg or the back thickens; rails between legs
+    Lines nearer to the middle hold it still when a leg or the back thickens; rails between legs
     stretch evenly.
     """
-    quarters = [(half - ends[0][0]) / 2, half / 2, half / 2]
+    quarters = [(half - ends[0][0]) / 2, half / 4, half / 2]
     lines = [
         _lines([-half, -half + low, -quarter, quarter, half - high, half], cells)
         for quarter, (low, high) in zip(quarters, ends, strict=True)

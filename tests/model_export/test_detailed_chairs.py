@@ -5,6 +5,7 @@ import pytest
 import trimesh
 
 from model_export.detailed import NAMES, detailed_chair
+from service.deform.normals import face_crosses
 from service.template.loader import load_template
 
 SEEDS = [0, 1, 2, 4, 5, 9]
@@ -66,3 +67,37 @@ def test_density_is_how_finely_a_chair_is_cut(seed):
     assert len(fine.mesh(fine.parameters)) > 50_000
     extents = [np.ptp(chair.mesh(chair.parameters), axis=0) for chair in (coarse, fine)]
     np.testing.assert_allclose(*extents, rtol=0.03)
+
+
+@pytest.mark.parametrize("seed", [2, 8, 11, 110])
+def test_no_true_edit_of_a_welded_chair_folds_a_face(seed):
+    chair = detailed_chair(seed, density=2)
+    assert chair.welded
+    before = face_crosses(chair.mesh(chair.parameters), chair.faces)
+    for index in range(len(NAMES)):
+        for factor in (0.7, 1.4):
+            edited = chair.parameters.copy()
+            edited[index] *= factor
+            after = face_crosses(chair.mesh(edited), chair.faces)
+            assert (np.einsum("fc,fc->f", before, after) > 0.0).all()
+
+
+def test_a_panels_rounded_edges_keep_their_radius():
+    chair = detailed_chair(6)
+    taller = chair.parameters.copy()
+    taller[NAMES.index("back_height")] *= 1.4
+    before, after = chair.mesh(chair.parameters), chair.mesh(taller)
+    high = before[:, 1] > before[:, 1].max() - 0.002
+    moved = (after - before)[high, 1]
+    assert np.ptp(before[high, 1]) > 0.001
+    np.testing.assert_allclose(moved, moved[0], atol=1e-9)
+
+
+def test_a_welded_leg_without_rails_stretches_evenly():
+    chair = detailed_chair(2)
+    taller = chair.parameters.copy()
+    taller[NAMES.index("leg_height")] *= 1.4
+    before, after = chair.mesh(chair.parameters), chair.mesh(taller)
+    top = -chair.parameters[NAMES.index("seat_thickness")] / 2
+    below = before[:, 1] < top - 1e-6
+    np.testing.assert_allclose((after[below, 1] - top) / (before[below, 1] - top), 1.4)
