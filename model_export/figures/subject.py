@@ -34,6 +34,8 @@ OVER = 0.5
 """Opacity of a template that is drawn over the mesh."""
 STILL = 1e-5
 """Share of the shape's radius by which nothing visible moves."""
+SHORT = 12
+"""Letters of a title's last line that leave room for a remark beside it."""
 REACHED = 0.02
 """Share by which an edited value may miss what was asked without remark."""
 
@@ -114,7 +116,8 @@ class Subject:
         vertices = self._canonical(answer)
         away = np.linalg.norm(vertices - self.found.vertices, axis=1)
         notes = remarks(answer, changes) if away.max() > STILL else ["nothing moves"]
-        title = (", " if len(changes) == 1 else "\n").join([title, *notes])
+        beside = len(changes) == 1 and len(title.rpartition("\n")[2]) < SHORT
+        title = (", " if beside else "\n").join([title, *notes])
         faces = self.found.mesh.faces
         return Panel(title, [(vertices, faces, tinted(away, faces), 1.0)])
 
