@@ -18,6 +18,9 @@ from 1.22 to 2.23 m."""
 CHILD = 0.45, 1.22
 """Metres that children are tall who are noticeably shorter."""
 
+WORDS = {"in": "inches", "ft": "feet"}
+"""Units whose symbols read as other words."""
+
 
 def size_ratio(template: AffineTemplate, metres: Array) -> float:
     """How large a shape is beside typical ones: 1 is ordinary, 1000 is millimetres for metres.
@@ -62,8 +65,10 @@ def _warning(name: str, ratio: float, lenient: float, format: str, unit: str) ->
     if 1.0 / lenient <= ratio <= lenient:
         return None
     told = "metres" if format in METRIC else unit
+    article = "an" if name[0] in "aeiou" else "a"
+    times = f"{ratio:.0f}" if ratio >= 10.0 else f"{ratio:.2g}"
     start = (
-        f"a {name} of this size would be {ratio:.2g} times as large as usual, "
+        f"{article} {name} of this size would be {times} times as large as usual, "
         f"with {told} as the unit of the file"
     )
     factor = UNITS["m" if format in METRIC else unit]
@@ -75,9 +80,10 @@ def _warning(name: str, ratio: float, lenient: float, format: str, unit: str) ->
     likely = min(others, key=lambda name: others[name])
     if others[likely] > np.log(lenient):
         return f"{start}; its scale may be arbitrary: lengths are in {told} all the same"
+    guess = f"{start}; it seems to be in {WORDS.get(likely, likely)}"
     if format in METRIC:
-        return f"{start}; it seems to be in {likely}, but its format's unit is the metre"
-    return f"{start}; it seems to be in {likely}: say units={likely}"
+        return f"{guess}, but its format's unit is the metre"
+    return f"{guess}: say units={likely}"
 
 
 def _typical(template: AffineTemplate) -> list[tuple[float, float]]:

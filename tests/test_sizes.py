@@ -32,8 +32,10 @@ def test_the_likelier_unit_is_named(
 ) -> None:
     warning = size_warning(chair, VALUES * scale, "obj", unit)
     assert warning is not None
-    assert warning.endswith(f"it seems to be in {likely}: say units={likely}")
+    word = "inches" if likely == "in" else likely
+    assert warning.endswith(f"it seems to be in {word}: say units={likely}")
     assert f"with {unit} as the unit" in warning
+    assert "e+" not in warning
 
 
 def test_gltf_is_in_metres_whatever_the_client_says(chair: AffineTemplate) -> None:
@@ -70,7 +72,8 @@ def test_grown_people_are_passed_over(metres: float) -> None:
 def test_a_persons_unit_is_guessed(metres: float, unit: str, likely: str) -> None:
     warning = stature_warning("human", metres, "obj", unit)
     assert warning is not None
-    assert warning.endswith(f"it seems to be in {likely}: say units={likely}")
+    word = {"in": "inches", "ft": "feet"}.get(likely, likely)
+    assert warning.endswith(f"it seems to be in {word}: say units={likely}")
 
 
 def test_who_is_small_may_be_a_child() -> None:
