@@ -24,7 +24,7 @@ CLEARLY = (1.25, 0.02)
 # mean square over and above what its vertices need: from a box, and from a part that is known to be
 # no box.
 BEYOND = (0.06, 0.02)
-# Share of a piece that is within a flat part which it makes up with others, and of a part's length
+# Share of a piece that is within a flat arm which it makes up with others, and of a part's length
 # and breadth which one piece covers that lies at its side.
 SLIM, COVERS = 0.25, 0.7
 # Share of the part's length under which a piece is carried.
@@ -144,14 +144,16 @@ def _bridged(cases: Cases, groups: list[Group], boxes: Boxes, hubs: Mask) -> Mas
     return bridged
 
 
-def realised(low: Array32, high: Array32, extent: Array32, boxes: Boxes) -> tuple[Mask, Mask]:
+def realised(
+    low: Array32, high: Array32, extent: Array32, groups: list[Group], boxes: Boxes
+) -> tuple[Mask, Mask]:
     """``[pieces, P]`` whether what lies inside a part runs along it and through its middle, and
     whether it does so along all of it.
 
     Args:
         low, high: ``[pieces, P, 3]`` ends of what touches a part.
         extent: ``[pieces, P, 3]`` sizes of the pieces.
-        boxes: of the parts.
+        groups, boxes: of the parts.
     """
     thin = boxes.thin
     inside = np.clip(high, -0.5, 0.5) - np.clip(low, -0.5, 0.5)
@@ -163,8 +165,9 @@ def realised(low: Array32, high: Array32, extent: Array32, boxes: Boxes) -> tupl
     full = (along | ~boxes.long).all(axis=2)
     # A seat runs along the arms beside it, and is none.
     flat = boxes.long.sum(axis=1) > 1
+    sides = [part for g in groups if len(g.members) > 1 for part in g.members if flat[part]]
     slim = ((inside >= SLIM * extent) | ~thin).all(axis=2)
-    made &= full | slim | ~flat
+    made[:, sides] &= (full | slim)[:, sides]
     # What covers all of a flat part is of it, be it a board at its lower side.
     made |= flat & ((inside >= COVERS) | thin).all(axis=2)
     return made, made & full

@@ -83,11 +83,12 @@ def vote(
     nearest = np.minimum.reduceat(distances, starts, axis=1).T
     far = distances > np.repeat(nearest.T, counts, axis=1) + np.float32(TOUCH)
     (low, high), (touch_low, touch_high) = _extents(u, order, starts, far)
-    made, full = realised(touch_low, touch_high, high - low, boxes)
+    made, full = realised(touch_low, touch_high, high - low, groups, boxes)
     made &= nearest < TOUCH
+    full &= made
     cost = mean_distance(to_group, starts)
     free = mean_distance(to_group.min(axis=0, keepdims=True), starts)
-    cases = Cases(made, full & made, nearest, cost, free, high - low, touching)
+    cases = Cases(made, full, nearest, cost, free, high - low, touching)
     shares = hung(choose(cases, groups, boxes, hubs), nearest.min(axis=1), high - low, touching)
     rods = _elongated((high - low) * boxes.sizes.astype(np.float32))
     # Nothing holds the tip of a propeller's blade, off the wing, as a spindle's ends are held.
@@ -117,7 +118,7 @@ def vote(
     together = Assemblies(carried[:, :, None] & thin, touching)
     near = np.maximum(touch_low, low), np.minimum(touch_high, high)
     contact = together.contacts(*near, nearest)
-    own, across = thickness(low, high, made, member, contact)
+    own, across = thickness(low, high, made, full, member, contact)
     keep = np.where(thin, own, keep)
     shift = np.where(thin, across, shift)
     left = skin | np.isnan(shares[:, :1])

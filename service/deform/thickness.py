@@ -23,7 +23,7 @@ LEANS = 0.9
 
 
 def thickness(
-    low: Array32, high: Array32, made: Mask, member: Mask, contact: Array32
+    low: Array32, high: Array32, made: Mask, full: Mask, member: Mask, contact: Array32
 ) -> tuple[Array32, Array32]:
     """How far pieces thicken with the parts that they make up, and what is added to that.
 
@@ -32,7 +32,7 @@ def thickness(
 
     Args:
         low, high: ``[pieces, P, 3]`` ends of the pieces; see `set_upright`.
-        made: ``[pieces, P]`` the parts that a piece makes up.
+        made, full: ``[pieces, P]`` the parts that a piece makes up, and those that it does alone.
         member: ``[pieces, P]`` the parts that a piece follows.
         contact: ``[pieces, P, 3]`` unit coordinates nearest a part's middle where it is touched.
 
@@ -46,7 +46,9 @@ def thickness(
     slope = within * passage(extent / most, *SECTION)
     # What makes up no part is carried at the spot where it touches.
     place = np.where(made[:, :, None], center, np.clip(contact, -0.5, 0.5))
-    shift = (1.0 - slope) * place - slope * center * passage(extent, *CENTRED)
+    # Bars and posts are off the middle that they were straightened by, a whole back is not.
+    off = center * passage(extent, *CENTRED) * ~full[:, :, None]
+    shift = (1.0 - slope) * place - slope * off
     return slope, shift.astype(np.float32)
 
 
