@@ -166,7 +166,7 @@ def realised(
     # A seat runs along the arms beside it, and is none.
     flat = boxes.long.sum(axis=1) > 1
     sides = [part for g in groups if len(g.members) > 1 for part in g.members if flat[part]]
-    slim = ((inside >= SLIM * extent) | ~thin).all(axis=2)
+    slim = np.asarray(((inside >= SLIM * extent) | ~thin).all(axis=2))
     made[:, sides] &= (full | slim)[:, sides]
     # What covers all of a flat part is of it, be it a board at its lower side.
     made |= flat & ((inside >= COVERS) | thin).all(axis=2)
