@@ -57,7 +57,7 @@ def paint(
         below, kept = picture[seen], picture[seen, 3] * (1 - share)
         total = share + kept
         mixed = share[:, None] * shaded[face] + kept[:, None] * below[:, :3]
-        picture[seen] = np.column_stack([mixed / total[:, None], total])
+        picture[seen] = np.column_stack([mixed / np.maximum(total, 1e-9)[:, None], total])
         ground = np.maximum(ground, depth)
     return np.clip(picture, 0.0, 1.0).reshape(height, width, 4)
 
